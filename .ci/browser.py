@@ -66,9 +66,9 @@ class Browser:
         message, self.buffer = self.buffer.split(b"\0", 1)
         return json.loads(message)
 
-    def open(self, url, width, scheme):
+    def open(self, url, width, scheme, height=900):
         """Opens `url` and returns the events of its loading."""
-        self.ask("Emulation.setDeviceMetricsOverride", width=width, height=900,
+        self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height,
                  deviceScaleFactor=1, mobile=width < 600)
         self.ask("Emulation.setEmulatedMedia",
                  features=[{"name": "prefers-color-scheme", "value": scheme}])
@@ -86,11 +86,12 @@ class Browser:
             raise RuntimeError(answer["exceptionDetails"])
         return answer["result"].get("value")
 
-    def key(self, key):
+    def key(self, key, shift=False):
         """Presses a key, as a keyboard does."""
         text = {"text": key} if len(key) == 1 else {}
         for kind in ("keyDown", "keyUp"):
-            self.ask("Input.dispatchKeyEvent", type=kind, key=key, **(text if kind == "keyDown" else {}))
+            self.ask("Input.dispatchKeyEvent", type=kind, key=key, modifiers=8 if shift else 0,
+                     **(text if kind == "keyDown" else {}))
 
     def mouse(self, kind, x, y, **more):
         self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
@@ -101,9 +102,10 @@ class Browser:
         clip = {"x": box[0], "y": box[1], "width": box[2], "height": box[3], "scale": 1}
         return self.ask("Page.captureScreenshot", clip=clip, captureBeyondViewport=True)["data"]
 
-    def shot(self, path, width, height):
+    def shot(self, path, width, height, whole=True):
+        """A picture of the page from its top, or of what is seen of it."""
         clip = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
-        image = self.ask("Page.captureScreenshot", clip=clip, captureBeyondViewport=True)
+        image = self.ask("Page.captureScreenshot", **({"clip": clip, "captureBeyondViewport": True} if whole else {}))
         path.write_bytes(base64.b64decode(image["data"]))
 
     def close(self):

@@ -187,6 +187,7 @@ fn setup_on(
             exr: images::exr_options(manifest, &attributes, &render, placed.view.projection),
             attributes,
             overlays: Vec::new(),
+            overlay_entries: Vec::new(),
             overlay_values: Vec::new(),
             preview: images::preview_options(manifest, &render),
             has_opaque_previews: manifest.has_opaque_previews && manifest.output.transparent,

@@ -1,7 +1,9 @@
 //! Pictures as files for the page.
 
+use serde_json::{Value, json};
+
 use crate::output::{OutputError, PictureFormat, PreviewBackground};
-use crate::overlay::Page;
+use crate::overlay::{Layout, Page};
 use crate::pipeline::{Setup, TracedFrame};
 use crate::render::{Channels, Film};
 
@@ -10,11 +12,13 @@ pub(super) struct Encoded {
     pub(super) bytes: Vec<u8>,
     /// The type of the file, as in HTTP.
     pub(super) mime: &'static str,
+    /// Where the picture and the overlays are in it, as JSON.
+    pub(super) layout: Value,
 }
 
 /// The file of the last picture: the bytes of the preview of the job.
 pub(super) fn last(setup: &Setup, frame: &TracedFrame) -> Result<Encoded, OutputError> {
-    Ok(Encoded { bytes: frame.to_png(setup)?, mime: "image/png" })
+    Ok(Encoded { bytes: frame.to_png(setup)?, mime: "image/png", layout: layout(setup, frame) })
 }
 
 /// Least height of pictures with overlays, pixels: those of a job are then small, but can be read.
@@ -41,7 +45,27 @@ pub(super) fn draft(setup: &Setup, frame: &mut TracedFrame) -> Result<Encoded, O
     } else {
         (PictureFormat::Jpeg, "image/jpeg")
     };
-    Ok(Encoded { bytes: frame.to_picture(setup, format)?, mime })
+    Ok(Encoded { bytes: frame.to_picture(setup, format)?, mime, layout: layout(setup, frame) })
+}
+
+/// Where the picture and the overlays are on the page of `frame`, in its pixels.
+fn layout(setup: &Setup, frame: &TracedFrame) -> Value {
+    let (page, areas) = setup.overlay_areas(frame);
+    let files = &setup.picture.files;
+    let overlays = files.overlay_entries.iter().zip(&files.overlays).zip(areas);
+    let overlays = overlays.map(|((entry, overlay), area)| {
+        json!({
+            "entry": entry,
+            "is_beside": overlay.layout == Layout::Beside,
+            "at": area.at,
+            "size": area.size,
+        })
+    });
+    json!({
+        "size": page.size,
+        "picture": { "at": page.at, "size": page.picture },
+        "overlays": overlays.collect::<Vec<_>>(),
+    })
 }
 
 /// `setup` for a picture that is smaller by a factor `scale`, with the page around it.

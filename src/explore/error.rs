@@ -1,5 +1,7 @@
 //! Why there is no picture.
 
+use spherule_formats::FrameError;
+
 use crate::job::RunError;
 use crate::manifest::ManifestError;
 use crate::pipeline::ImageError;
@@ -48,6 +50,12 @@ pub enum ExploreError {
         /// Number of particles in the frame.
         particles: usize,
     },
+    /// The picture on the page has only some of the particles.
+    #[error(
+        "render.memory_limit: not all particles fit into it, and a draft with some of them is not saved; raise the \
+         limit"
+    )]
+    Draft,
     /// There are too many settings.
     #[error("more than {MAX_SETTINGS} settings")]
     TooMany,
@@ -73,6 +81,11 @@ impl ExploreError {
             }
         };
         Fault { message: self.to_string(), key }
+    }
+
+    /// Whether a file needs more memory than it may.
+    pub(super) const fn is_too_large(&self) -> bool {
+        matches!(self, Self::Job(RunError::Frame(FrameError::TooLarge { .. })))
     }
 
     /// Whether rendering was stopped for a newer wish.

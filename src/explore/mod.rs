@@ -16,6 +16,7 @@ mod shared;
 mod stage;
 #[cfg(test)]
 mod stage_tests;
+mod thin;
 mod wish;
 mod worker;
 

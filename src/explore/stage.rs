@@ -10,6 +10,7 @@ use spherule_jobs::catch_panic;
 use super::encode::{self, Encoded};
 use super::error::{ExploreError, MAX_SETTINGS, MAX_VALUES};
 use super::level::Level;
+use super::thin::{self, Reading};
 use super::wish::{Setting, overrides};
 use crate::job::{Findings, JobManifest, RenderJob, RunError, require_one_fits};
 use crate::manifest::{Manifest, ManifestSource};
@@ -65,6 +66,7 @@ pub(super) struct Stage {
     /// The parts that are kept, if some are left out.
     parts: Option<Vec<String>>,
     findings: Findings,
+    thinning: Thinning,
     prepared: Option<Prepared>,
     built: Option<Built>,
     /// The particles of a frame as they are in its files, if they were asked for.
@@ -86,12 +88,36 @@ pub(super) struct Prepared {
     pub(super) lines: Vec<String>,
 }
 
+/// What follows from settings and particles.
+struct Resolved {
+    job: RenderJob,
+    survey: Survey,
+    setup: Setup,
+    lines: Vec<String>,
+}
+
+/// Which of the particles are surveyed.
+struct Thinning {
+    /// One of so many.
+    every: u32,
+    /// The settings that it was chosen for.
+    data: Vec<Setting>,
+}
+
+impl Default for Thinning {
+    fn default() -> Self {
+        Self { every: 1, data: Vec::new() }
+    }
+}
+
 /// A frame in a renderer.
 struct Built {
     /// What it was built for.
     key: String,
     renderer: Box<dyn FrameRenderer>,
     frame: BuiltFrame,
+    /// Of so many particles it has one.
+    every: u32,
     notes: Vec<String>,
 }
 
@@ -100,6 +126,8 @@ pub(super) struct StagePicture {
     pub(super) encoded: Encoded,
     pub(super) under: Under,
     pub(super) particles: u64,
+    /// Of so many particles of the frame it shows one.
+    pub(super) every: u32,
     pub(super) time: Option<f64>,
     /// Seconds from the particles in memory to the file.
     pub(super) seconds: f64,
@@ -122,6 +150,7 @@ impl Stage {
             sequence,
             parts: None,
             findings: Findings::default(),
+            thinning: Thinning::default(),
             prepared: None,
             built: None,
             particles: None,
@@ -150,7 +179,7 @@ impl Stage {
         });
         let source = given.with(overrides(settings).map_err(ExploreError::Setting)?);
         let (manifest, warnings) = source.parse()?;
-        let mut requested =
+        let requested =
             JobManifest { manifest, source: Some(source.clone()), ..self.requested.clone() };
         // Open the sequence again if they choose other particles or places
         let opened_for = sequence_settings(&requested.manifest);
@@ -158,6 +187,33 @@ impl Stage {
             self.open(&requested)?;
             self.opened_for = opened_for;
         }
+        // Survey every n-th particle if all of them need too much memory
+        let data = data_settings(settings);
+        if self.thinning.data != data {
+            self.thin(Thinning { every: 1, data });
+        }
+        let resolved = match self.resolve(&requested) {
+            Err(error) if error.is_too_large() => {
+                let limit = requested.manifest.render.memory_limit;
+                let every = thin::survey_every(&self.sequence, limit).ok_or(error)?;
+                let data = std::mem::take(&mut self.thinning.data);
+                self.thin(Thinning { every, data });
+                self.resolve(&requested)?
+            }
+            resolved => resolved?,
+        };
+        let Resolved { job, survey, mut setup, mut lines } = resolved;
+        lines.extend(warnings);
+        let channels = setup.picture.render.channels;
+        setup.picture.render.channels = Channels::COLOR.with(&[FilmPlane::Id, FilmPlane::Position]);
+        let chosen = settings.to_vec();
+        Ok(Prepared { chosen, job, source, survey, channels, setup, lines })
+    }
+
+    /// Surveys the sequence, and resolves the automatic settings.
+    fn resolve(&mut self, requested: &JobManifest) -> Result<Resolved, ExploreError> {
+        let mut requested = requested.clone();
+        self.sequence.set_thinning(self.thinning.every);
         let completed = self.complete(&requested)?;
         let has_parts = self.parts.is_none() || completed.1.input.parts == self.parts;
         let (mut lines, manifest) = if has_parts {
@@ -165,22 +221,27 @@ impl Stage {
         } else {
             // Parts that were left out before are needed
             self.open(&requested)?;
+            self.sequence.set_thinning(self.thinning.every);
             self.complete(&requested)?
         };
         self.parts.clone_from(&manifest.input.parts);
         requested.manifest = manifest;
-        lines.extend(warnings);
-        // Resolve the automatic settings
         let mut job = RenderJob::new(requested, &self.sequence, None)?.keeping_environment();
         if let Some(known) = &self.prepared {
             job = job.with_files_of(&known.job);
         }
-        let (survey, mut setup) = job.survey_with(&self.sequence, &mut self.findings)?;
+        let (survey, setup) = job.survey_with(&self.sequence, &mut self.findings)?;
         lines.extend(job.scene_notes()?);
-        let channels = setup.picture.render.channels;
-        setup.picture.render.channels = Channels::COLOR.with(&[FilmPlane::Id, FilmPlane::Position]);
-        let chosen = settings.to_vec();
-        Ok(Prepared { chosen, job, source, survey, channels, setup, lines })
+        Ok(Resolved { job, survey, setup, lines })
+    }
+
+    /// Forgets what was found with other particles.
+    fn thin(&mut self, thinning: Thinning) {
+        if self.thinning.every != thinning.every {
+            self.findings = Findings::default();
+            self.built = None;
+        }
+        self.thinning = thinning;
     }
 
     fn open(&mut self, requested: &JobManifest) -> Result<(), ExploreError> {
@@ -237,6 +298,7 @@ impl Stage {
             encoded,
             under,
             particles: traced.report.particles,
+            every: built.every,
             time: traced.time,
             seconds: start.elapsed().as_secs_f64(),
             notes: built.notes.clone(),
@@ -256,20 +318,20 @@ impl Stage {
             Some(built) if kind == RendererKind::Cpu => built.renderer,
             _ => renderer_of(kind),
         };
-        let mut tasks = prepared.job.tasks(&self.sequence, &[frame]);
-        prepared.job.schedule(&self.sequence, &prepared.setup, &mut tasks);
-        require_one_fits(&tasks)?;
-        let task = tasks.first().ok_or(ExploreError::NoFrame { frame })?;
-        let (setup, sequence) = (&prepared.setup, &self.sequence);
-        let mut notes = Vec::new();
+        let surveyed = self.thinning.every;
+        let reading =
+            thin::reading((&prepared.job, &prepared.setup), &self.sequence, frame, surveyed)?;
+        let Reading { setup, task, every, mut notes } = reading;
+        self.sequence.set_thinning(every);
+        let sequence = &self.sequence;
         let frame = catch_panic(|| {
-            let mut loaded = load_frame(setup, sequence, task)?;
+            let mut loaded = load_frame(&setup, sequence, &task)?;
             notes.append(&mut loaded.notes);
-            Ok(renderer.prepare(setup, loaded)?)
+            Ok(renderer.prepare(&setup, loaded)?)
         });
         let frame = frame.map_err(ExploreError::Image)?;
         notes.extend(frame.notes().iter().cloned());
-        self.built = Some(Built { key, renderer, frame, notes });
+        self.built = Some(Built { key, renderer, frame, every, notes });
         Ok(())
     }
 
@@ -284,6 +346,7 @@ impl Stage {
         let index = index.ok_or(ExploreError::NoFrame { frame })?;
         if self.particles.as_ref().is_none_or(|(own, _)| *own != index) {
             self.particles = None;
+            self.sequence.set_thinning(1);
             let read = self.sequence.load_raw(index).map_err(RunError::Frame)?;
             self.particles = Some((index, read));
         }
@@ -301,7 +364,7 @@ impl Stage {
     }
 
     /// Renders the picture of `frame` to the file `path`, with the channels of the job if it is an EXR.
-    pub(super) fn write_picture(&self, frame: i64, path: &Path) -> Result<(), ExploreError> {
+    pub(super) fn write_picture(&mut self, frame: i64, path: &Path) -> Result<(), ExploreError> {
         let prepared = self.prepared.as_ref().expect("settings come first");
         let mut setup = prepared.setup.clone();
         if PictureFormat::of(path) == Some(PictureFormat::Exr) {
@@ -309,6 +372,12 @@ impl Stage {
         }
         let mut tasks = prepared.job.tasks(&self.sequence, &[frame]);
         prepared.job.schedule(&self.sequence, &setup, &mut tasks);
+        // A draft with some of the particles is not what a job renders
+        require_one_fits(&tasks)?;
+        if self.thinning.every > 1 {
+            return Err(ExploreError::Draft);
+        }
+        self.sequence.set_thinning(1);
         let task = tasks.first_mut().ok_or(ExploreError::NoFrame { frame })?;
         path.clone_into(&mut task.image);
         task.preview = None;
@@ -352,19 +421,28 @@ fn sequence_settings(manifest: &Manifest) -> Vec<(String, String)> {
 fn build_key(prepared: &Prepared, frame: i64) -> String {
     let picture = &prepared.setup.picture;
     let settings = prepared.manifest().settings();
-    let is_shading = |key: &str| {
-        SHADING_KEYS.iter().any(|own| key.starts_with(own))
-            && !OTHER_KEYS.iter().any(|own| key.starts_with(own))
-    };
     let others: Vec<_> = settings.into_iter().filter(|(key, _)| !is_shading(key)).collect();
     format!(
-        "{frame} {:?} {:?} {:?} {:?} {} {others:?}",
+        "{frame} {:?} {:?} {:?} {:?} {:?} {} {others:?}",
         picture.origin,
         picture.renderer,
         picture.particles.radius,
         picture.files.overlay_values,
+        prepared.manifest().render.memory_limit,
         colored_by(&picture.particles.color, picture.renderer),
     )
+}
+
+/// Whether a key needs no other particles and no other tree.
+fn is_shading(key: &str) -> bool {
+    // Lists have no more in their keys
+    let is_in = |own: &&str| key.starts_with(*own) || own.strip_suffix('.') == Some(key);
+    SHADING_KEYS.iter().any(is_in) && !OTHER_KEYS.iter().any(is_in)
+}
+
+/// The settings that need other particles or another tree.
+fn data_settings(settings: &[Setting]) -> Vec<Setting> {
+    settings.iter().filter(|own| !is_shading(&own.key)).cloned().collect()
 }
 
 /// What a frame has for its colours. On the CPU, maps are applied to its values when they are shaded.

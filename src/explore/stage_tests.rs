@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
+use spherule_formats::{ParticleFrame, Positions, RawParticles, native};
 use spherule_jobs::{Interrupt, ResumeMode};
 
 use super::level::Level;
@@ -137,4 +139,76 @@ fn drafts_are_small_and_refused_settings_name_their_key() {
     assert_eq!(missing.expect("an error").to_string(), "frame 4711: is not in the sequence");
     let last = Level { size: [64, 36], samples: 4, is_last: true };
     assert!(stage.picture(FRAME, &last, &AtomicBool::new(false)).is_ok());
+}
+
+#[test]
+fn pages_learn_where_overlays_are() {
+    let mut stage = stage();
+    let overlays = json!([
+        { "type": "text", "text": "a", "corner": "bottom-right", "offset": [0.5, 0.25] },
+        { "type": "axes", "corner": "top-left" },
+    ]);
+    let settings = [set("overlay", overlays), set("legend", json!(false))];
+    let render = stage.prepare(&settings).expect("valid").setup.picture.render;
+    let size = [render.width, render.height];
+    let level = Level { size, samples: render.samples, is_last: true };
+    let made = stage.picture(FRAME, &level, &AtomicBool::new(false)).expect("a picture");
+    let layout = made.encoded.layout;
+    assert_eq!(layout["size"], json!([64, 36]));
+    assert_eq!(layout["picture"], json!({ "at": [0, 0], "size": [64, 36] }));
+    let numbers = |entry: usize, key: &str| -> Vec<i64> {
+        serde_json::from_value(layout["overlays"][entry][key].clone()).expect("numbers")
+    };
+    let (at, own) = (numbers(0, "at"), numbers(0, "size"));
+    assert_eq!([64 - at[0] - own[0], 36 - at[1] - own[1]], [18, 9]);
+    assert_eq!((numbers(1, "at"), &layout["overlays"][1]["entry"]), (vec![1, 1], &json!(1)));
+}
+
+#[test]
+fn frames_beyond_the_memory_limit_are_thinned() {
+    // A native frame whose particles are selected, so that they are copied
+    let dir = tempfile::tempdir().expect("a directory");
+    let path = dir.path().join("a_7.spf");
+    let side = 80_u16;
+    let at = |i: u16| f32::from(i) / f32::from(side);
+    let points = (0..side).flat_map(|x| {
+        (0..side).flat_map(move |y| (0..side).map(move |z| Vec3::new(at(x), at(y), at(z))))
+    });
+    let positions = Positions::F32(points.collect());
+    let raw = RawParticles { positions, ..RawParticles::default() };
+    native::write(&path, &ParticleFrame::from_raw(raw, DVec3::ZERO), Some(0)).expect("written");
+    let input = Override::new("input.path", path.to_str().expect("UTF-8"), "INPUT");
+    let small = ["image.width=64", "image.height=36", "image.samples=1"].map(Override::parse);
+    let all = std::iter::once(input).chain(small).map(|own| own.expect("an override"));
+    let source = ManifestSource::new("", Path::new("command line"), all.collect());
+    let (manifest, _) = source.parse().expect("valid");
+    let requested = JobManifest { source: Some(source), ..JobManifest::new(manifest, "") };
+    let mut stage = Stage::new(requested.clone(), requested.open_sequence().expect("frames"));
+    let level = Level { size: [64, 36], samples: 1, is_last: true };
+    let mut picture = |settings: &[Setting]| {
+        stage.prepare(settings)?;
+        let made = stage.picture(FRAME, &level, &AtomicBool::new(false));
+        let saved = stage.write_picture(FRAME, &dir.path().join("saved.png"));
+        made.map(|made| (made, saved))
+    };
+    let limit = |limit: &str| {
+        vec![set("select.where", json!("x >= 0")), set("render.memory_limit", json!(limit))]
+    };
+    let (whole, saved) = picture(&limit("4GiB")).expect("a picture");
+    assert_eq!((whole.every, whole.particles), (1, 512_000));
+    assert!(saved.is_ok());
+    // In the first, the survey can read the file, of 6 MB; in the second, not even that
+    for small in ["16MiB", "10MiB"] {
+        let (thinned, saved) = picture(&limit(small)).expect("a draft");
+        assert!(thinned.every > 1, "{small}");
+        assert_eq!(thinned.particles, 512_000_u64.div_ceil(thinned.every.into()), "{small}");
+        assert!(thinned.notes.iter().any(|note| note.starts_with("a draft with 1 of ")));
+        // A draft is not saved as a picture
+        let refused = saved.expect_err("refused").to_string();
+        assert!(refused.contains("render.memory_limit"), "{refused}");
+    }
+    assert_eq!(picture(&limit("4GiB")).expect("a picture").0.every, 1);
+    // Nothing fits
+    let error = picture(&limit("1MiB")).err().expect("refused").to_string();
+    assert!(error.contains("render.memory_limit"), "{error}");
 }

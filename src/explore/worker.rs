@@ -95,13 +95,21 @@ fn facts(
         Projection::Orthographic { height } => ("orthographic", Some(height)),
         Projection::Equirectangular => ("equirectangular", None),
     };
+    // The part of the whole image that the picture shows
+    let whole = [setup.picture.render.width, setup.picture.render.height];
+    let window = setup.picture.render.window;
+    let (first, image) = window.map_or(([0, 0], whole), |own| ([own.left, own.top], own.image));
     let notes = prepared.lines.iter().chain(&picture.notes);
     json!({
         "frame": frame,
         "time": picture.time,
         "particles": picture.particles,
+        "every": picture.every,
         "size": level.size,
-        "of": [setup.picture.render.width, setup.picture.render.height],
+        "of": whole,
+        "window": { "first": first, "image": image },
+        "is_stereo": setup.picture.scene.camera.eyes() != [1, 1],
+        "layout": picture.encoded.layout,
         "samples": level.samples,
         "of_samples": setup.picture.render.samples,
         "is_last": level.is_last,

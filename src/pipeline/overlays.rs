@@ -2,7 +2,7 @@
 
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use crate::overlay::{Drawing, FrameValues, FrameView, Page, Sprite, draw, marks};
+use crate::overlay::{Area, Drawing, FrameValues, FrameView, Page, Sprite, areas, draw, marks};
 use crate::render::{Film, FilmPlane};
 use crate::scene::{Camera, Projection, RgbEncoding};
 
@@ -52,6 +52,15 @@ impl Setup {
         let (width, height) = (frame.film.width, frame.film.height);
         let page = self.page_of(width, height);
         marks(&self.picture.files.overlays, &page, &self.frame_view(frame))
+    }
+
+    /// The page of an image, and the areas of its overlays. Those of two eyes have none.
+    pub fn overlay_areas(&self, frame: &TracedFrame) -> (Page, Vec<Area>) {
+        let page = self.page_of(frame.film.width, frame.film.height);
+        if frame.camera.eyes() != [1, 1] {
+            return (page, Vec::new());
+        }
+        (page, areas(&self.picture.files.overlays, &page, &self.frame_view(frame)))
     }
 
     /// The overlays of an image.

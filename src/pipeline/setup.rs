@@ -358,6 +358,8 @@ pub struct FileSettings {
     pub exr: ExrOptions,
     /// What is drawn over previews.
     pub overlays: Vec<Overlay>,
+    /// The place of each of them in the list of the manifest, which may have overlays that show nothing.
+    pub overlay_entries: Vec<usize>,
     /// Names of the values whose ranges overlays show.
     pub overlay_values: Vec<String>,
     /// Options of the PNG; [`Setup::preview_from`] adds the background of jobs of earlier versions.

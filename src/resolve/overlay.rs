@@ -54,8 +54,8 @@ pub(super) fn add_overlays(
     let points = film_points(setup, survey, &camera, page.picture);
     let view = first_view(setup, survey, &camera);
     // Collect what each overlay shows
-    let (mut overlays, mut given) = (Vec::new(), Vec::new());
-    for own in &manifest.overlays {
+    let (mut overlays, mut given, mut entries) = (Vec::new(), Vec::new(), Vec::new());
+    for (entry, own) in manifest.overlays.iter().enumerate() {
         let content = match &own.kind {
             OverlayKind::Image { height, .. } => pictures.next().map(|source| {
                 Content::Image(Image { source: Arc::clone(source), height: *height })
@@ -68,6 +68,7 @@ pub(super) fn add_overlays(
         if let Content::Text(template) = &content {
             setup.picture.files.overlay_values.extend(template.names().map(str::to_owned));
         }
+        entries.push(entry);
         given.push(own.color);
         overlays.push(Overlay {
             content,
@@ -83,6 +84,7 @@ pub(super) fn add_overlays(
     choose_corners(&mut overlays, page, &view, &points);
     choose_colors(setup, &mut overlays, &given, page, &view);
     setup.picture.files.overlays = overlays;
+    setup.picture.files.overlay_entries = entries;
     Ok(())
 }
 

@@ -46,6 +46,23 @@ impl NativeFrame<'_> {
         let chosen: Vec<usize> = sample_indices(blocks, (most / BLOCK_SIZE).max(1))
             .flat_map(|block| block * BLOCK_SIZE..count.min((block + 1) * BLOCK_SIZE))
             .collect();
+        Ok(self.chosen(&chosen, &leaves))
+    }
+
+    /// The particles whose index is a multiple of `every`, in world coordinates and with attributes and radii.
+    ///
+    /// # Errors
+    /// As [`Self::to_raw`].
+    ///
+    /// # Panics
+    /// `every` is 0.
+    pub fn every(&self, every: usize) -> Result<RawParticles, ParseError> {
+        let chosen: Vec<usize> = (0..self.len()?).step_by(every).collect();
+        Ok(self.chosen(&chosen, &self.leaves()?))
+    }
+
+    /// The particles with these indices.
+    fn chosen(&self, chosen: &[usize], leaves: &StoredLeaves<'_>) -> RawParticles {
         let origin = DVec3::from_array(self.index().origin);
         let position = |i: &usize| leaves.center(*i).as_dvec3() + origin;
         // Copy their attributes
@@ -62,11 +79,11 @@ impl NativeFrame<'_> {
         }
         // Add the radii
         if wants_radius(&attributes)
-            && let Some(radius) = self.radius_of(&leaves)
+            && let Some(radius) = self.radius_of(leaves)
         {
             attributes.push(radii(chosen.iter().map(|i| radius(*i)).collect()));
         }
-        Ok(RawParticles {
+        RawParticles {
             positions: Positions::F64(chosen.iter().map(position).collect()),
             attributes,
             time: self.index().time,
@@ -74,7 +91,7 @@ impl NativeFrame<'_> {
             labels: self.index().details.labels.clone(),
             cell: self.index().details.cell,
             ..RawParticles::default()
-        })
+        }
     }
 
     /// Distances from `queries` evenly spread particles to their nearest particle at another position, among

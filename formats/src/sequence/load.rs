@@ -8,7 +8,7 @@ use std::time::SystemTime;
 
 use glam::DVec3;
 
-use super::{PartFile, Sequence};
+use super::{PartFile, Sequence, thinning};
 use crate::join::{PART, Part, join, join_numbered};
 use crate::open::FrameFile;
 use crate::{FrameError, MemoryBudget, ParseError, ParticleFrame, RawParticles, escape_controls};
@@ -65,6 +65,28 @@ impl Sequence {
     /// # Panics
     /// If there is no frame `index`.
     pub fn load_measured(&self, index: usize) -> Result<Loaded, FrameError> {
+        if self.every > 1 {
+            return self.load_thinned(index);
+        }
+        self.load_whole(index)
+    }
+
+    /// Reads every n-th particle of frame `index`.
+    fn load_thinned(&self, index: usize) -> Result<Loaded, FrameError> {
+        if let Some(path) = self.native_file(index) {
+            let mut particles = thinning::native(path, self.every)?;
+            particles.time = self.listed_time(index).or(particles.time);
+            let all_bytes = fs::metadata(path).map_or(0, |meta| meta.len());
+            return Ok(Loaded { particles, notes: Vec::new(), all_bytes, content_bytes: 0 });
+        }
+        let mut loaded = self.load_whole(index)?;
+        loaded.content_bytes += loaded.particles.byte_len();
+        thinning::keep(&mut loaded.particles, self.every);
+        Ok(loaded)
+    }
+
+    /// Reads all particles of frame `index`.
+    fn load_whole(&self, index: usize) -> Result<Loaded, FrameError> {
         // Two frames need not be in memory at once
         if self.placement.align.is_some() {
             self.reference(index)?;

@@ -30,6 +30,7 @@ mod pieces;
 mod placement;
 mod references;
 mod scan;
+mod thinning;
 mod times;
 mod topology;
 
@@ -120,6 +121,8 @@ pub struct Sequence {
     topology: Option<Topology>,
     placement: Placement,
     reference: ReferenceCell,
+    /// Of so many particles of a frame one is read.
+    every: u32,
     /// What there is with all parts, if some are left out unless they are named.
     all_parts: Option<AllParts>,
 }
@@ -197,6 +200,7 @@ impl Sequence {
             topology: None,
             placement: Placement::default(),
             reference: ReferenceCell::default(),
+            every: 1,
             all_parts: None,
         }
     }
@@ -236,6 +240,7 @@ impl Sequence {
             topology: None,
             placement: Placement::default(),
             reference: ReferenceCell::default(),
+            every: 1,
             all_parts,
         }
     }
@@ -364,6 +369,12 @@ impl Sequence {
     pub fn set_placement(&mut self, placement: Placement) {
         self.placement = placement;
         self.reference = ReferenceCell::default();
+    }
+
+    /// Reads only those particles of frames whose index is a multiple of `every`, if that is not 0. Those without ids get
+    /// their indices as ids. Of native frames, the others need no memory.
+    pub fn set_thinning(&mut self, every: u32) {
+        self.every = every.max(1);
     }
 
     /// Replaces the frames by `count` times the middle one, with the numbers from 0: for pictures from all sides.

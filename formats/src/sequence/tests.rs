@@ -252,6 +252,37 @@ fn frames_are_loaded_and_parts_merged() {
 }
 
 #[test]
+fn thinned_frames_have_the_particles_of_multiples() {
+    let dir = Dir::with(&[]);
+    let points = |count: u8| (0..count).map(|i| Vec3::new(f32::from(i), 2.0, 1.0)).collect();
+    write_frame(&dir.path("alone_1.spf"), points(50), 1);
+    write_frame(&dir.path("fluid_2.spf"), points(7), 2);
+    write_frame(&dir.path("wall_2.spf"), points(4), 2);
+    for (name, count) in [("alone_1.spf", 50_u32), ("", 11)] {
+        // A native frame is read in steps, and parts are read as a whole
+        let mut sequence = if name.is_empty() {
+            fs::remove_file(dir.path("alone_1.spf")).expect("a file");
+            dir.open("").expect("a sequence")
+        } else {
+            dir.open(name).expect("a sequence")
+        };
+        let whole = sequence.load_raw(0).expect("readable");
+        assert_eq!(whole.positions.len(), count as usize);
+        sequence.set_thinning(4);
+        let thinned = sequence.load_raw(0).expect("readable");
+        let ids: Vec<u32> = (0..count).step_by(4).collect();
+        let expected: Vec<DVec3> = ids.iter().map(|id| whole.positions.get(*id as usize)).collect();
+        let found: Vec<DVec3> =
+            (0..thinned.positions.len()).map(|i| thinned.positions.get(i)).collect();
+        assert_eq!(found, expected);
+        let own = thinned.attributes.iter().find(|own| own.name == "id").expect("ids");
+        assert_eq!(own.data, AttributeData::U32(ids));
+        sequence.set_thinning(0);
+        assert_eq!(sequence.load_raw(0).expect("readable"), whole);
+    }
+}
+
+#[test]
 fn one_file_is_a_sequence_of_its_steps() {
     let dir = Dir::with(&[]);
     write_frame(&dir.path("alone.spf"), vec![Vec3::ONE], 3);

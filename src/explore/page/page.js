@@ -9,14 +9,13 @@ const SIDES = {
   front: [0, -1, 0], back: [0, 1, 0], left: [-1, 0, 0], right: [1, 0, 0],
   top: [0, -1e-4, 1], bottom: [0, -1e-4, -1], iso: [-0.61, -0.61, 0.5],
 };
-const CORNERS = ["auto", "top-left", "top-right", "bottom-left", "bottom-right"];
 
 const state = {
-  frames: [], schema: null, fields: new Map(), names: [], histogram: null,
+  frames: [], schema: null, fields: new Map(), lists: [], names: [], histogram: null,
   chosen: new Map(), past: [], future: [],
   frame: 0, view: null, facts: null, values: {}, blob: null, number: 0,
   isMoving: false, wishes: 0, isSending: false, isWished: false, isAtRest: false,
-  clicked: [], picks: 0, playing: 0, hasParticles: false,
+  legend: [], given: {}, bounds: null, clicked: [], picks: 0, playing: 0, hasParticles: false,
 };
 // For tests: the last picture and what belongs to it
 window.explore = state;
@@ -113,6 +112,7 @@ function showPicture({ wish: number, facts }, blob) {
   $("busy").hidden = true;
   state.blob = blob;
   state.facts = facts;
+  takeBounds(facts.bounds);
   state.shown = number;
   // While the mouse moves, the view here is ahead of the picture
   if (!state.isMoving && number >= state.wishes) {
@@ -125,13 +125,17 @@ function showPicture({ wish: number, facts }, blob) {
   }
   const [width, height] = facts.size;
   const time = facts.time === null ? "" : `, time ${Number(facts.time.toPrecision(6))}`;
-  const how = facts.is_last ? "as rendered" : `${facts.samples} of ${facts.of_samples} samples`;
+  const isWhole = facts.every === 1;
+  const how = facts.is_last ? (isWhole ? "as rendered" : "a draft") : `${facts.samples} of ${facts.of_samples} samples`;
+  $("draft").hidden = isWhole;
+  $("draft").textContent = isWhole ? "" : `Draft: 1 of ${facts.every} particles. Not all of them fit into the memory limit.`;
   $("status").textContent =
     `${facts.particles.toLocaleString("en")} particles${time}, ${width} x ${height}, ${how}, ${facts.milliseconds} ms`;
   const list = $("notes").querySelector("ul");
   list.replaceChildren(...facts.notes.map((note) => element("li", {}, note)));
   $("notes").hidden = facts.notes.length === 0;
   $("notes").querySelector("summary").textContent = `Notes (${facts.notes.length})`;
+  showPlaced();
 }
 
 // --- What was chosen
@@ -148,7 +152,8 @@ function choose(changes, { isMoving = false, isNew = true } = {}) {
     if (value !== undefined) state.chosen.set(key, value);
   }
   state.isMoving = isMoving;
-  if (!isMoving) showChosen();
+  if (isMoving) showPlaced();
+  else showChosen();
   wish();
 }
 
@@ -172,6 +177,9 @@ function showChosen() {
   for (const [key, fields] of state.fields) for (const field of fields) showField(key, field);
   showClips();
   showOverlays();
+  state.lists.forEach(showList);
+  showSun();
+  showPlaced();
   showKeys();
 }
 
@@ -181,7 +189,10 @@ async function takeValues(number) {
   if (valuesOf === number) return;
   valuesOf = number;
   try {
+    const isUnchanged = state.chosen.size === 0;
+    const chosen = listOf("overlay").length;
     state.values = await ask("values", { settings: settings() });
+    takeLists(state.values, { chosen, isUnchanged });
     showChosen();
     showColor();
   } catch (error) {
@@ -287,11 +298,11 @@ function fit() {
 
 /// The place of an event in the picture, as fractions; null outside.
 function placeOf(event) {
-  const box = $("stage").getBoundingClientRect();
-  const [width, height] = state.facts ? state.facts.of : [16, 9];
-  const scale = Math.min(box.width / width, box.height / height);
-  const x = (event.clientX - box.left - (box.width - width * scale) / 2) / (width * scale);
-  const y = (event.clientY - box.top - (box.height - height * scale) / 2) / (height * scale);
+  const box = pictureBox();
+  if (!box) return null;
+  const stage = $("stage").getBoundingClientRect();
+  const x = (event.clientX - stage.left - box.at[0]) / box.size[0];
+  const y = (event.clientY - stage.top - box.at[1]) / box.size[1];
   return x >= 0 && x < 1 && y >= 0 && y < 1 ? [x, y] : null;
 }
 
@@ -549,19 +560,14 @@ function reason(text) {
 const titled = (name) => (name[0].toUpperCase() + name.slice(1)).replaceAll("_", " ");
 
 let fieldCount = 0;
-function addField(parent, key) {
-  const schema = schemaOf(key);
-  if (!schema) return;
-  fieldCount += 1;
-  const id = `field-${fieldCount}`;
-  const label = element("label", { for: id, title: key }, titled(key.split(".").slice(-1)[0]));
-  const about = element("div", { class: "about", hidden: "" }, `${key}: ${schema.description || ""}`);
-  label.addEventListener("click", () => { about.hidden = !about.hidden; });
+
+/// The control of a value with this schema, and the list of its words if it has one beside it.
+function makeControl(schema, id, example) {
   const isList = isOnlyWords(schema);
   const name = isList ? "select" : isTables(schema) ? "textarea" : "input";
   const input = element(name, { id, spellcheck: "false" });
   if (isTables(schema)) {
-    Object.assign(input, { rows: 3, placeholder: EXAMPLES[key] || "[{ }]" });
+    Object.assign(input, { rows: 3, placeholder: example || "[{ }]" });
   } else if (isList) {
     input.append(element("option", { value: "" }, "default"));
     for (const word of wordsOf(schema)) input.append(element("option", { value: JSON.stringify(word) }, String(word)));
@@ -573,26 +579,54 @@ function addField(parent, key) {
     const words = wordsOf(schema);
     const list = element("datalist", { id: `${id}-words` }, ...words.map((w) => element("option", { value: String(w) })));
     input.setAttribute("list", list.id);
-    parent.append(list);
+    return { input, isList, words: [list] };
   }
+  return { input, isList, words: [] };
+}
+
+/// A field of the setting `key` that calls `set` with its value, or with undefined for the default: what belongs into the
+/// page, and the field.
+function makeField({ key, name, schema, set }) {
+  fieldCount += 1;
+  const id = `field-${fieldCount}`;
+  const label = element("label", { for: id, title: key }, titled(name));
+  const about = element("div", { class: "about", hidden: "" }, `${key}: ${schema.description || ""}`);
+  label.addEventListener("click", () => { about.hidden = !about.hidden; });
+  const { input, isList, words } = makeControl(schema, id, EXAMPLES[key]);
   input.setAttribute("aria-description", `${key}: ${schema.description || ""}`);
   const why = element("div", { class: "why", role: "alert", hidden: "" });
   const reset = element("button", { class: "reset", title: "Back to the default", "aria-label": `Default of ${key}`, hidden: "" }, "reset");
   const box = element("div", { class: "field" }, label, input, reset, about, why);
-  const field = { box, input, reset, why, isList };
   input.addEventListener("change", () => {
     const value = isList ? (input.value === "" ? undefined : JSON.parse(input.value)) : typed(input.value);
     // A list that is no JSON would be refused as a text; say where it is wrong
     if (isTables(schema) && typeof value === "string") return showFault({ key, message: `${key}: ${reason(value)}` });
-    return choose({ [key]: value });
+    return set(value);
   });
-  reset.addEventListener("click", () => choose({ [key]: undefined }));
+  reset.addEventListener("click", () => set(undefined));
+  return { parts: [...words, box], field: { box, input, reset, why, isList } };
+}
+
+function addField(parent, key) {
+  const schema = schemaOf(key);
+  if (!schema) return;
+  const name = key.split(".").slice(-1)[0];
+  const { parts, field } = makeField({ key, name, schema, set: (value) => choose({ [key]: value }) });
   state.fields.set(key, [...(state.fields.get(key) || []), field]);
-  parent.append(box);
+  parent.append(...parts);
   showField(key, field);
 }
 
-function showField(key, { box, input, reset, isList }) {
+/// Adds the form of a key: a field, or one for each entry of a list.
+function addForm(parent, key) {
+  const schema = schemaOf(key);
+  if (schema && isTables(schema)) addList(parent, key);
+  else addField(parent, key);
+}
+
+function showField(key, { box, input, reset, isList, isEntry }) {
+  // Fields of entries are made again when their list changes
+  if (isEntry) return;
   const isChanged = state.chosen.has(key);
   const value = isChanged ? state.chosen.get(key) : state.values[key];
   box.classList.toggle("changed", isChanged);
@@ -608,7 +642,7 @@ function showField(key, { box, input, reset, isList }) {
 
 function makeForms() {
   for (const place of document.querySelectorAll("[data-keys]")) {
-    for (const key of place.dataset.keys.split(" ")) addField(place, key);
+    for (const key of place.dataset.keys.split(" ")) addForm(place, key);
   }
   // All keys, by section
   for (const [section, node] of Object.entries(state.schema.properties)) {
@@ -616,7 +650,7 @@ function makeForms() {
     const own = keys.filter((key) => schemaOf(key));
     const box = element("details", { "data-section": section }, element("summary", {}, section));
     box.addEventListener("toggle", () => {
-      if (box.open && box.childElementCount === 1) own.forEach((key) => addField(box, key));
+      if (box.open && box.childElementCount === 1) own.forEach((key) => addForm(box, key));
     });
     $("all").append(box);
   }
@@ -778,73 +812,6 @@ function listenToColor() {
   }
 }
 
-// --- Clips and overlays, which are lists
-
-/// The list of a key, to be changed.
-const listOf = (key) => structuredClone(state.chosen.get(key) || []);
-
-function change(key, change, options) {
-  const list = listOf(key);
-  change(list);
-  choose({ [key]: list.length === 0 ? undefined : list }, options);
-}
-
-function choice(label, words, value, onchange) {
-  const select = element("select", { "aria-label": label }, ...words.map((word) => element("option", { value: word }, word)));
-  select.value = value;
-  select.addEventListener("change", () => onchange(select.value));
-  return select;
-}
-
-function showClips() {
-  const { bounds } = state.facts || { bounds: [[0, 0, 0], [1, 1, 1]] };
-  const rows = listOf("clip").map((clip, i) => {
-    const axis = "xyz".indexOf(clip.normal.slice(-1));
-    const sign = clip.normal.startsWith("-") ? -1 : 1;
-    const ends = [bounds[0][axis], bounds[1][axis]];
-    const slider = element("input", {
-      type: "range", min: ends[0], max: ends[1], step: (ends[1] - ends[0]) / 200 || 1, value: sign * clip.offset,
-      "aria-label": `Place of plane ${i + 1}`,
-    });
-    let isNew = true;
-    const slide = (isMoving) => {
-      const offset = sign * Number(Number(slider.value).toPrecision(6));
-      change("clip", (list) => { list[i].offset = offset; }, { isMoving, isNew });
-      isNew = !isMoving;
-    };
-    slider.addEventListener("input", () => slide(true));
-    slider.addEventListener("change", () => slide(false));
-    return element("div", { class: "row" },
-      choice(`Side of plane ${i + 1}`, ["x", "-x", "y", "-y", "z", "-z"], clip.normal, (normal) => {
-        const own = "xyz".indexOf(normal.slice(-1));
-        const middle = 0.5 * (bounds[0][own] + bounds[1][own]);
-        change("clip", (list) => Object.assign(list[i], { normal, offset: (normal.startsWith("-") ? -1 : 1) * middle }));
-      }),
-      element("label", { class: "grow" }, slider),
-      choice(`Kind of plane ${i + 1}`, ["particles", "cut"], clip.mode, (mode) => change("clip", (list) => { list[i].mode = mode; })),
-      element("button", { "aria-label": `Remove plane ${i + 1}`, onclick: () => change("clip", (list) => list.splice(i, 1)) }, "Remove"));
-  });
-  const box = $("clips");
-  // A slider that is held stays
-  if (!box.contains(document.activeElement) || box.childElementCount !== rows.length) box.replaceChildren(...rows);
-}
-
-function showOverlays() {
-  const rows = listOf("overlay").map((overlay, i) => element("div", { class: "row" },
-    element("span", {}, titled(overlay.type)),
-    ...(overlay.type === "text" ? [textOf(overlay, i)] : []),
-    choice(`Corner of overlay ${i + 1}`, CORNERS, overlay.corner || "auto", (corner) =>
-      change("overlay", (list) => { list[i].corner = corner; })),
-    element("button", { "aria-label": `Remove overlay ${i + 1}`, onclick: () => change("overlay", (list) => list.splice(i, 1)) }, "Remove")));
-  $("overlays").replaceChildren(...rows);
-}
-
-function textOf(overlay, i) {
-  const input = element("input", { value: overlay.text, "aria-label": `Text of overlay ${i + 1}` });
-  input.addEventListener("change", () => change("overlay", (list) => { list[i].text = input.value; }));
-  return input;
-}
-
 // --- Keys of the camera
 
 function showKeys() {
@@ -930,24 +897,6 @@ function listenToButtons() {
   $("keys-clear").addEventListener("click", () => {
     if (state.view) choose({ "camera.key": undefined, "camera.degrees_per_frame": undefined, ...cameraOf(state.view) });
   });
-  $("clip-add").addEventListener("click", () => {
-    const { bounds } = state.facts || { bounds: [[0, 0, 0], [1, 1, 1]] };
-    const offset = Number((0.5 * (bounds[0][0] + bounds[1][0])).toPrecision(6));
-    change("clip", (list) => list.push({ type: "plane", normal: "x", offset, mode: "particles" }));
-  });
-  for (const button of document.querySelectorAll("[data-overlay]")) {
-    button.addEventListener("click", () => {
-      const type = button.dataset.overlay;
-      change("overlay", (list) => list.push({ type, ...(type === "text" && { text: "{time}" }) }));
-    });
-  }
-  const sun = (isMoving) => choose({
-    "environment.sun": { ...(state.values["environment.sun"] || {}), elevation: Number($("elevation").value), azimuth: Number($("azimuth").value) },
-  }, { isMoving, isNew: !isMoving });
-  for (const id of ["elevation", "azimuth"]) {
-    $(id).addEventListener("input", () => sun(true));
-    $(id).addEventListener("change", () => sun(false));
-  }
   $("save").addEventListener("click", () => save("save", { name: $("name").value }, (made) => `Saved ${made.path}`));
   $("copy").addEventListener("click", copyCommand);
   $("save-picture").addEventListener("click", () => {
@@ -955,17 +904,6 @@ function listenToButtons() {
     save("save-picture", { name: $("picture-name").value }, (made) => `Saved ${made.path}`);
   });
   $("render").addEventListener("click", renderAll);
-}
-
-/// The sun belongs to a sky.
-function showSun() {
-  const kind = state.chosen.get("environment.type") ?? state.values["environment.type"];
-  $("sun").hidden = kind !== "sky";
-  const own = state.chosen.get("environment.sun") ?? state.values["environment.sun"];
-  if (own && !$("sun").contains(document.activeElement)) {
-    $("elevation").value = own.elevation;
-    $("azimuth").value = own.azimuth;
-  }
 }
 
 async function begin() {
@@ -980,7 +918,7 @@ async function begin() {
   listenToStage();
   listenToButtons();
   listenToColor();
-  new MutationObserver(showSun).observe($("changed"), { childList: true });
+  listenToPlaced();
   showChosen();
   // A simulation's first frame is rarely typical
   showFrame(Math.floor(frames.length / 2));

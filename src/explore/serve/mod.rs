@@ -4,7 +4,7 @@
 //! and one that names this machine by another name than its own, as pages can whose name resolves to it. Nothing but
 //! this page is served, and it needs nothing else.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Write as _};
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -112,18 +112,30 @@ impl Server {
 
 /// Answers `request`.
 fn answer(mut request: Request, service: &Service, (token, is_local): (&Token, bool)) {
+    // The token is known to be there when the path is used
+    let path = request.url().get(token.as_str().len() + 2..).unwrap_or_default().to_owned();
     let reply = match refusal(&request, token, is_local) {
         Some(refused) => refused,
         None => match body(&mut request) {
             Ok(body) => {
                 let is_post = *request.method() == Method::Post;
-                // The token is known to be there
-                let path = request.url().get(token.as_str().len() + 2..).unwrap_or_default();
-                route::reply(service, is_post, path, &body)
+                route::reply(service, is_post, &path, &body)
             }
             Err(refused) => refused,
         },
     };
+    let name = path.split('?').next().unwrap_or_default();
+    // The page may have gone
+    let _ = if KEPT.contains(&name) { send(request, reply) } else { send_last(request, &reply) };
+}
+
+/// Requests that follow one another fast, after which the connection stays open. The others end it: a browser opens
+/// several at once for the files of the page, and `tiny_http` may leave a new one without a thread until one of the others
+/// ends.
+const KEPT: [&str; 3] = ["wish", "picture", "particle"];
+
+/// Sends a reply.
+fn send(request: Request, reply: Reply) -> io::Result<()> {
     let Reply { status, mime, headers, bytes } = reply;
     let mut response = Response::from_data(bytes).with_status_code(status);
     for (name, value) in guard::HEADERS.into_iter().chain([("Content-Type", mime)]) {
@@ -132,8 +144,23 @@ fn answer(mut request: Request, service: &Service, (token, is_local): (&Token, b
     for (name, value) in headers {
         response.add_header(header(name, &value));
     }
-    // The page may have gone
-    let _ = request.respond(response);
+    request.respond(response)
+}
+
+/// Sends a reply that ends its connection, which a [`Response`] cannot.
+fn send_last(request: Request, reply: &Reply) -> io::Result<()> {
+    let Reply { status, mime, headers, bytes } = reply;
+    let mut head = format!("HTTP/1.1 {status} \r\nContent-Length: {}\r\n", bytes.len());
+    let own = headers.iter().map(|(name, value)| (*name, value.as_str()));
+    let common = [("Content-Type", *mime), ("Connection", "close")];
+    for (name, value) in guard::HEADERS.into_iter().chain(common).chain(own) {
+        head += &format!("{name}: {value}\r\n");
+    }
+    head += "\r\n";
+    let mut writer = request.into_writer();
+    writer.write_all(head.as_bytes())?;
+    writer.write_all(bytes)?;
+    writer.flush()
 }
 
 /// A header whose value has no control characters.

@@ -14,9 +14,12 @@ use crate::explore::wish::{Setting, Wish};
 use crate::manifest::job_schema;
 
 /// The files of the page.
-const FILES: [(&str, &str, &str); 3] = [
+const FILES: [(&str, &str, &str); 6] = [
     ("", "text/html; charset=utf-8", include_str!("../page/index.html")),
     ("page.css", "text/css; charset=utf-8", include_str!("../page/page.css")),
+    ("handles.js", "text/javascript; charset=utf-8", include_str!("../page/handles.js")),
+    ("placed.js", "text/javascript; charset=utf-8", include_str!("../page/placed.js")),
+    ("lists.js", "text/javascript; charset=utf-8", include_str!("../page/lists.js")),
     ("page.js", "text/javascript; charset=utf-8", include_str!("../page/page.js")),
 ];
 

@@ -84,6 +84,15 @@ pub struct FrameView {
     pub axes: [[f32; 3]; 3],
 }
 
+/// Where an overlay is on its page, without its halo, pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Area {
+    /// Column and row of its top left corner.
+    pub at: [i32; 2],
+    /// Width and height.
+    pub size: [i32; 2],
+}
+
 /// A small picture at a place of a large one: premultiplied sRGB with alpha.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sprite {
@@ -184,16 +193,29 @@ fn on_page(frame: &FrameView, page: &Page) -> FrameView {
     FrameView { units_per_height: frame.units_per_height / part, ..frame.clone() }
 }
 
+/// The areas of `overlays` for a page.
+pub fn areas(overlays: &[Overlay], page: &Page, frame: &FrameView) -> Vec<Area> {
+    areas_of_view(overlays, page, &on_page(frame, page))
+}
+
+/// The same with the view for overlays.
+fn areas_of_view(overlays: &[Overlay], page: &Page, frame: &FrameView) -> Vec<Area> {
+    let [width, height] = page.size;
+    let sizes: Vec<[i32; 2]> =
+        overlays.iter().map(|overlay| overlay.size_in(width, height, frame)).collect();
+    let corners = place(overlays, &sizes, page);
+    corners.into_iter().zip(sizes).map(|(at, size)| Area { at, size }).collect()
+}
+
 /// Draws `overlays` for a page.
 pub fn draw(overlays: &[Overlay], page: &Page, frame: &FrameView) -> Vec<Sprite> {
     let frame = on_page(frame, page);
-    let [width, height] = page.size;
-    let sizes: Vec<[i32; 2]> =
-        overlays.iter().map(|overlay| overlay.size_in(width, height, &frame)).collect();
-    let corners = place(overlays, &sizes, page);
-    let drawn = overlays.iter().zip(sizes).zip(corners);
+    let areas = areas_of_view(overlays, page, &frame);
+    let drawn = overlays.iter().zip(areas);
     drawn
-        .map(|((overlay, size), corner)| overlay.draw(corner, size, &overlay.pen(height), &frame))
+        .map(|(overlay, Area { at, size })| {
+            overlay.draw(at, size, &overlay.pen(page.size[1]), &frame)
+        })
         .collect()
 }
 

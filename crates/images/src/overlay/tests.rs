@@ -211,3 +211,27 @@ fn many_categories_have_columns_that_fit_the_picture() {
     assert_eq!(one[1], 11 * 28 + 18);
     assert!(two[1] <= 340 && two[0] > 3 * one[0], "{one:?} {two:?}");
 }
+
+#[test]
+fn areas_are_those_of_the_sprites_without_halos() {
+    let at_right = Placement { corner: Corner::BottomRight, offset: [0.1, 0.2] };
+    let overlays = [
+        text("Speed"),
+        Overlay { placement: at_right, ..bar("v") },
+        Overlay { layout: Layout::Beside, ..bar("w") },
+    ];
+    let frame = FrameView::default();
+    let page = Page::with_room_for(&overlays, [500, 400], &frame);
+    let found = areas(&overlays, &page, &frame);
+    for (area, sprite) in found.iter().zip(draw(&overlays, &page, &frame)) {
+        let margin = area.at[0] - sprite.left;
+        assert!((1..8).contains(&margin) && area.at[1] - sprite.top == margin, "{area:?}");
+        let size = [sprite.width, sprite.height].map(|side| side - 2 * margin);
+        assert_eq!(area.size, size);
+    }
+    // The distances from the corner of the picture, in pixels
+    let [width, height] = page.picture.map(u32::cast_signed);
+    let Area { at, size } = found[1];
+    assert_eq!([width - at[0] - size[0], height - at[1] - size[1]], [40, 80]);
+    assert!(found[2].at[0] > width, "beside the picture");
+}
