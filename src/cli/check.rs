@@ -60,7 +60,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
         print::lines(check.to_lines())?;
     }
     for problem in &check.problems {
-        message!("error: {problem}");
+        error!("{problem}");
     }
     Ok(if check.problems.is_empty() { Outcome::Done } else { Outcome::Refused })
 }

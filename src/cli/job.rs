@@ -189,7 +189,7 @@ impl FinishedRun<'_> {
                 // The same command rejoins the job
                 let is_temporary = matches!(error, RunError::Job(JobError::DeclaredDead { .. }));
                 let error = CliError::from(error).to_string();
-                message!("error: {error}");
+                error!("{error}");
                 events::add_to_end(json!({"errors": [error]}));
                 if is_temporary { Outcome::Interrupted } else { Outcome::SomeFailed }
             }

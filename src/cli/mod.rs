@@ -10,10 +10,17 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 use spherule_formats::escape_controls;
 
-/// Prints a line on standard error.
+/// Prints a line on standard error, unless `--quiet` is given.
 macro_rules! message {
     ($($text:tt)*) => {
         $crate::cli::print::message(&format!($($text)*))
+    };
+}
+
+/// Prints an error on standard error, also with `--quiet`.
+macro_rules! error {
+    ($($text:tt)*) => {
+        $crate::cli::print::error(&format!($($text)*))
     };
 }
 
@@ -69,6 +76,9 @@ use errors::CliError;
 #[derive(Debug, Parser)]
 #[command(name = "spherule", version, max_term_width = 100)]
 struct Cli {
+    /// Print only errors: no notes, no progress.
+    #[arg(short, long, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -131,7 +141,7 @@ pub fn main() -> ExitCode {
         Err(error) => (Outcome::Refused.code(), error.messages()),
     };
     for error in &errors {
-        message!("error: {error}");
+        error!("{error}");
     }
     events::end(code, &errors);
     ExitCode::from(code)
@@ -153,7 +163,12 @@ fn hidden_command(arguments: &[OsString]) -> Option<fn() -> Result<Outcome, CliE
 fn parse(arguments: &[OsString]) -> Result<Command, u8> {
     let arguments = key_flags::with_equals(arguments.iter().cloned());
     let error = match Cli::try_parse_from(&arguments) {
-        Ok(cli) => return Ok(cli.command),
+        Ok(cli) => {
+            if cli.quiet {
+                print::silence();
+            }
+            return Ok(cli.command);
+        }
         Err(error) => error,
     };
     if !error.use_stderr() {
@@ -161,7 +176,7 @@ fn parse(arguments: &[OsString]) -> Result<Command, u8> {
         return Err(match print::written_to_stdout(printed) {
             Ok(_) => Outcome::Done.code(),
             Err(error) => {
-                message!("error: {error}");
+                error!("{error}");
                 Outcome::Refused.code()
             }
         });

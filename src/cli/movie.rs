@@ -275,7 +275,7 @@ impl MovieAfter {
         match self.try_make(interrupt) {
             Ok(outcome) => outcome,
             Err(error) => {
-                message!("error: no movie: {error}");
+                error!("no movie: {error}");
                 events::add_to_end(json!({"errors": [error.to_string()]}));
                 Outcome::SomeFailed
             }

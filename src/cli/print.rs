@@ -7,6 +7,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::Value;
 use spherule_formats::{escape_controls, is_control};
@@ -21,8 +22,33 @@ pub(super) enum Reader {
     Gone,
 }
 
-/// Prints one line to standard error. Ignores errors: a closed pipe or a full disk must not stop a job.
+/// Whether only errors are printed to standard error.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Prints only errors to standard error from now on.
+pub(super) fn silence() {
+    IS_QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether only errors are printed to standard error.
+pub(super) fn is_quiet() -> bool {
+    IS_QUIET.load(Ordering::Relaxed)
+}
+
+/// Prints one line to standard error, unless only errors are printed. Ignores errors: a closed pipe or a full disk must
+/// not stop a job.
 pub(super) fn message(text: &str) {
+    if !is_quiet() {
+        to_stderr(text);
+    }
+}
+
+/// Prints an error as one line to standard error.
+pub(super) fn error(text: &str) {
+    to_stderr(&format!("error: {text}"));
+}
+
+fn to_stderr(text: &str) {
     let _ = io::stderr().write_all(line(text).as_bytes());
 }
 

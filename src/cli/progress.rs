@@ -87,6 +87,7 @@ impl Progress {
         let output = output.display().to_string();
         events::send("start", json!({"command": command, "total": total, "output": output}));
         let display = match mode {
+            ProgressMode::Auto | ProgressMode::Plain if print::is_quiet() => Display::Nothing,
             ProgressMode::Auto if stderr().is_terminal() => Display::Bar(bar(total)),
             ProgressMode::Auto | ProgressMode::Plain => Display::Plain,
             ProgressMode::Openjd => Display::Openjd,
@@ -153,7 +154,7 @@ impl Progress {
     fn failed(&self, failure: &FrameFailure) {
         let (frame, reason) = (failure.frame, failure.to_string());
         let done = self.count(Some(frame));
-        self.message(&format!("error: frame {frame}: {reason}"));
+        self.above_bar(|| error!("frame {frame}: {reason}"));
         let facts = json!({"frame": frame, "reason": reason, "done": done, "total": self.total()});
         events::send("frame_failed", facts);
         self.line(done, "");
@@ -164,7 +165,7 @@ impl Progress {
         match event {
             QueueEvent::Waiting(frame, worker) => {
                 let text = format!("waiting for frame {frame}: {worker} is working on it");
-                self.message(&text);
+                self.above_bar(|| message!("{text}"));
                 events::send("note", json!({"text": text}));
             }
             QueueEvent::FinishedElsewhere(frame, status) => {
@@ -183,17 +184,14 @@ impl Progress {
 
     /// Prints a note, whatever the mode.
     fn note(&self, text: &str) {
-        match &self.display {
-            Display::Bar(bar) => bar.suspend(|| note!("{text}")),
-            _ => note!("{text}"),
-        }
+        self.above_bar(|| note!("{text}"));
     }
 
-    /// Prints a line on standard error, whatever the mode.
-    fn message(&self, text: &str) {
+    /// Calls `print` while there is no bar.
+    fn above_bar(&self, print: impl FnOnce()) {
         match &self.display {
-            Display::Bar(bar) => bar.suspend(|| message!("{text}")),
-            _ => message!("{text}"),
+            Display::Bar(bar) => bar.suspend(print),
+            _ => print(),
         }
     }
 

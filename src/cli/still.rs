@@ -179,7 +179,7 @@ fn report(
         }
         Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(shown)(source)),
         Err(error) => {
-            message!("error: frame {frame}: {error}");
+            error!("frame {frame}: {error}");
             Ok(Outcome::SomeFailed)
         }
     }

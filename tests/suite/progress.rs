@@ -142,3 +142,17 @@ fn events_that_cannot_be_written_do_not_end_a_job() {
     let note = "note: standard output: no space left";
     assert_eq!(ran.errors().matches(note).count(), 1, "{}", ran.errors());
 }
+
+#[test]
+fn quiet_prints_errors_alone() {
+    let shop = one_damaged();
+    let ran = shop.run(&["still", "in", "--frame", "1", "-o", "a.png", "-q"]).expect(0);
+    assert_eq!(ran.errors(), "");
+    let ran =
+        shop.run(&[&["render", "--quiet", "in", "-o", "out/f.####.exr"], &SMALL[..]].concat());
+    let errors = ran.errors();
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    assert!(errors.starts_with("error: frame 2: "), "{errors}");
+    // The end of a frame is no error
+    assert!(!shop.run(&["still", "in", "--frame", "2", "-o", "b.png"]).errors().is_empty());
+}

@@ -106,7 +106,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
                     let shown = file.display().to_string();
                     print::json(&json!({"file": shown, "error": error}))
                 } else {
-                    message!("error: {error}");
+                    error!("{error}");
                     Ok(Reader::Listening)
                 }
             }

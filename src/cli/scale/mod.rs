@@ -145,7 +145,7 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     show_tables(&report, args.progress)?;
     if let Some((path, source)) = ended.unwritten {
         let error = CliError::Io { path, source };
-        message!("error: {error}");
+        error!("{error}");
         events::add_to_end(json!({"errors": [error.to_string()]}));
         return Ok(Outcome::SomeFailed);
     }
@@ -303,7 +303,7 @@ impl Progress {
         let summary = match &cell.outcome {
             CellOutcome::Done(measured) => table::line(measured),
             CellOutcome::Failed { reason } => {
-                message!("error: {name}: {reason}");
+                error!("{name}: {reason}");
                 "failed".to_owned()
             }
         };

@@ -121,7 +121,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     if args.requeue_bad
         && let Err(error) = requeue(&state, &damaged)
     {
-        message!("error: {error}");
+        error!("{error}");
     }
     let is_bad = |(_, verdict): &(i64, Verdict)| *verdict >= Verdict::Length;
     Ok(if verdicts.iter().any(is_bad) { Outcome::SomeFailed } else { Outcome::Done })
