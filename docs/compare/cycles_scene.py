@@ -84,6 +84,19 @@ def add_spheres(positions, radius, surface):
     bpy.context.collection.objects.link(thing)
 
 
+def add_glass_spheres(spheres, surface):
+    """Meshes: a refracted ray inside a point of a point cloud does not hit the same point from within."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=7, radius=1.0, enter_editmode=False)
+    first = bpy.context.object
+    first.data.shade_smooth()
+    first.data.materials.append(surface)
+    for index, (x, y, z, radius) in enumerate(spheres.tolist()):
+        ball = first if index == 0 else bpy.data.objects.new("ball", first.data)
+        if index > 0:
+            bpy.context.collection.objects.link(ball)
+        ball.location, ball.scale = (x, y, z), (radius, radius, radius)
+
+
 def add_water(scene):
     water = import_mesh(scene["mesh"])
     # import_mesh keeps the coordinates of the file, whose y is up
@@ -123,6 +136,11 @@ def add_sky(sky):
     texture.sky_type, texture.sun_disc = sky["model"], sky["sun"]
     texture.sun_size, texture.sun_elevation = math.radians(sky["size"]), math.radians(sky["elevation"])
     texture.sun_rotation = math.radians(90.0 - sky["azimuth"])  # clockwise from y
+    # The older models have these settings instead
+    elevation, azimuth = math.radians(sky["elevation"]), math.radians(sky["azimuth"])
+    level = math.cos(elevation)
+    texture.sun_direction = (level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation))
+    texture.turbidity, texture.ground_albedo = sky["turbidity"], sky["albedo"]
     links.new(texture.outputs["Color"], back.inputs["Color"])
     links.new(back.outputs[0], out.inputs["Surface"])
     bpy.context.scene.world = world
@@ -143,7 +161,7 @@ def add_environment(path, intensity):
     links.new(turn.outputs[0], image.inputs["Vector"])
     links.new(image.outputs["Color"], back.inputs["Color"])
     links.new(back.outputs[0], out.inputs["Surface"])
-    world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", image.image.size[0]
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", 2048
     bpy.context.scene.world = world
 
 
@@ -215,6 +233,8 @@ def main():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if scene.get("mesh"):
         add_water(scene)
+    elif scene["material"] == "glass":
+        add_glass_spheres(numpy.load(scene["particles"]), particle_material(scene))
     else:
         add_spheres(numpy.load(scene["particles"]), scene["radius"], particle_material(scene))
     if scene.get("spray"):

@@ -298,6 +298,13 @@ def reference_parts(name, environment, program, out):
     return sorted(out.glob(f"{name}-{environment}-{program}-reference-*.exr"))
 
 
+def reference_seconds(name, environment, program, out):
+    """The least time of a part of a converged picture."""
+    seconds = json.loads((out / "reference-seconds.json").read_text())
+    stem = f"{name}-{environment}-{program}-reference-"
+    return min(value for key, value in seconds.items() if key.startswith(stem))
+
+
 def errors(picture, reference):
     """Root mean square error in bytes of sRGB, and relative mean square error of linear RGB."""
     rmse = numpy.sqrt(numpy.mean((srgb_bytes(picture) - srgb_bytes(reference)) ** 2))
@@ -320,16 +327,26 @@ def table_row(name, environment, result, options, out):
             row[program, kind] = numpy.mean(values, axis=0)
             times = result["seconds" if kind == "noisy" else "denoised_seconds"][program]
             row[program, kind, "seconds"] = min(times)
-        # The errors contain the noise of the reference, by its part of the samples
-        row[program, "noisy"] = row[program, "noisy"] / numpy.array(
-            [(1 + result["samples"][program] / row[f"{program} reference"]) ** 0.5,
-             1 + result["samples"][program] / row[f"{program} reference"]])  # fmt: skip
+        # The errors contain the noise of the reference, in proportion to their samples
+        share = result["samples"][program] / row[f"{program} reference"]
+        noise = row[program, "noisy"] * [(1 + share) ** -0.5, 1 / (1 + share)]
+        error, relative = row[program, "denoised"]
+        row[program, "noisy"] = noise
+        left = max(error**2 - share * noise[0] ** 2, 0.0), max(relative - share * noise[1], 0.0)
+        row[program, "denoised"] = left[0] ** 0.5, left[1]
     ours, theirs = references["spherule"], references["cycles"]
-    row["means"] = ours.mean(), theirs.mean()
+    # Cycles adds what is behind a lamp to its light
+    rest = (ours.max(axis=-1) < 1.5) | (name != "cornell")
+    row["means"] = ours[rest].mean(), theirs[rest].mean()
     row["blocks"] = path_tracing.mean_relative_difference(path_tracing.blocks(ours), path_tracing.blocks(theirs))
     seconds = [row[program, "noisy", "seconds"] for program in ("spherule", "cycles")]
     variances = [row[program, "noisy"][0] ** 2 for program in ("spherule", "cycles")]
     row["ratio"] = variances[1] * seconds[1] / (variances[0] * seconds[0])
+    # The same for many samples, without the costs that do not depend on them: variance falls in proportion to samples
+    spent = [reference_seconds(name, environment, program, out) for program in ("spherule", "cycles")]
+    products = [v * result["samples"][p] * t for v, p, t in zip(variances, ("spherule", "cycles"), spent)]
+    row["ratio of many"] = products[1] / products[0]
+    row["spent"] = spent
     relative = [row[program, "noisy"][1] for program in ("spherule", "cycles")]
     row["relative ratio"] = relative[1] * seconds[1] / (relative[0] * seconds[0])
     row["shown"] = [pictures[p, k][0] for k in ("noisy", "denoised") for p in ("spherule", "cycles")]
@@ -340,7 +357,8 @@ def table_row(name, environment, result, options, out):
 def print_tables(options, out):
     results = json.loads((out / "results.json").read_text())
     rows = {}
-    for key, result in results.items():
+    known = [f"{name}-{environment}" for name in SCENES for environment in ENVIRONMENTS]
+    for key, result in [(key, results[key]) for key in known if key in results]:
         name, environment = key.split("-")
         row = table_row(name, environment, result, options, out)
         if row:
@@ -350,13 +368,14 @@ def print_tables(options, out):
         ours, theirs = row["means"]
         print(f"| {key.replace('-', ' | ')} | {row['spherule reference']}, {row['cycles reference']} | {ours:.4f} | "
               f"{theirs:.4f} | {100 * (ours / theirs - 1):+.2f} % | {row['blocks']:.2f} % |")  # fmt: skip
-    print("| scene | environment | samples | CPU s | RMSE spherule | Cycles | relative MSE spherule | Cycles | ratio | ratio of relative MSE |")
+    print("| scene | environment | samples | CPU s | RMSE spherule | Cycles | relative MSE spherule | Cycles | ratio | ratio of relative MSE | CPU s of 512 samples | ratio |")
     for key, row in rows.items():
         samples = results[key]["samples"]
         a, b = row["spherule", "noisy"], row["cycles", "noisy"]
         print(f"| {key.replace('-', ' | ')} | {samples['spherule']}, {samples['cycles']} | "
               f"{row['spherule', 'noisy', 'seconds']:.2f}, {row['cycles', 'noisy', 'seconds']:.2f} | {a[0]:.2f} | "
-              f"{b[0]:.2f} | {a[1]:.2g} | {b[1]:.2g} | {row['ratio']:.1f} | {row['relative ratio']:.1f} |")  # fmt: skip
+              f"{b[0]:.2f} | {a[1]:.2g} | {b[1]:.2g} | {row['ratio']:.1f} | {row['relative ratio']:.1f} | "
+              f"{row['spent'][0]:.1f}, {row['spent'][1]:.1f} | {row['ratio of many']:.1f} |")  # fmt: skip
     print("| scene | environment | CPU s | RMSE spherule | Cycles | relative MSE spherule | Cycles | RMSE spherule / Cycles |")
     for key, row in rows.items():
         a, b = row["spherule", "denoised"], row["cycles", "denoised"]
@@ -397,7 +416,7 @@ def main():
     out.mkdir(parents=True, exist_ok=True)
     # pysplashsurf is next to this Python
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    results = out / "results.json"
+    results, reference_times = out / "results.json", out / "reference-seconds.json"
     if not options.tables:
         if not (out / "inputs.json").exists():
             write_inputs(options, out)
@@ -414,6 +433,8 @@ def main():
                     image = out / f"{name}-{environment}-{program}-reference-{part}.exr"
                     if not image.exists():
                         seconds = render(program, options, scene, image)
+                        spent = json.loads(reference_times.read_text()) if reference_times.exists() else {}
+                        reference_times.write_text(json.dumps({**spent, image.name: seconds}, indent=1))
                         print(f"{image.name}: {seconds:.1f} s", flush=True)
     print_tables(options, out)
 

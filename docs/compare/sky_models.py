@@ -21,7 +21,8 @@ ALBEDO = 0.2
 SUN_SIZE = 0.545
 # Azimuths of the sun: to the left and behind the sphere
 SPHERULE_AZIMUTH, CYCLES_AZIMUTH = 225.0, 135.0
-MODELS = {"spherule": None, "cycles": "MULTIPLE_SCATTERING", "cycles-single": "SINGLE_SCATTERING"}
+MODELS = {"spherule": None, "cycles": "MULTIPLE_SCATTERING", "cycles-single": "SINGLE_SCATTERING",
+          "cycles-hosek-wilkie": "HOSEK_WILKIE"}  # fmt: skip
 XYZ_OF_RGB = numpy.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
 
 
@@ -58,6 +59,13 @@ def above_daylight(xyz):
     return y - (-3.0 * x**2 + 2.87 * x - 0.275)
 
 
+def color_text(xyz):
+    x, y = chromaticity(xyz)
+    kelvin = temperature(xyz)
+    text = f"{kelvin:.0f} K" if 1500 < kelvin < 25000 else "over 25 000 K" if kelvin > 25000 else "under 1500 K"
+    return f"{x:.3f} {y:.3f} ({text}, {above_daylight(xyz):+.3f})"
+
+
 # SPCTRAL2
 
 
@@ -65,21 +73,23 @@ def write_spectral(out):
     """Bird and Riordan, 1986, with the aerosols of a turbidity of 2.5 in Preetham and others, 1999."""
     import pvlib
 
-    beta = 0.04608 * TURBIDITY - 0.04586
     values = {}
     for elevation in ELEVATIONS:
-        zenith = 90.0 - elevation
-        spectra = pvlib.spectrum.spectrl2(
-            apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=ALBEDO, surface_pressure=101325.0,
-            relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith, "kastenyoung1989"), precipitable_water=1.5,
-            ozone=0.35, aerosol_turbidity_500nm=beta * 0.5**-1.3, dayofyear=80, alpha=1.3,
-        )  # fmt: skip
-        wavelengths = numpy.arange(380.0, 781.0, 5.0)
-        sums = {}
-        for name in ("dni", "dhi"):
-            spectrum = numpy.interp(wavelengths, spectra["wavelength"], numpy.ravel(spectra[name]))
-            sums[name] = (5.0 * spectrum[:, None] * observer(wavelengths)).sum(axis=0).tolist()
-        values[str(elevation)] = {"sun": sums["dni"], "sky": sums["dhi"]}
+        for turbidity in (TURBIDITY, 1.0):
+            zenith = 90.0 - elevation
+            beta = max(0.04608 * turbidity - 0.04586, 0.0)
+            spectra = pvlib.spectrum.spectrl2(
+                apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=ALBEDO, surface_pressure=101325.0,
+                relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith, "kastenyoung1989"), ozone=0.35,
+                precipitable_water=1.5, aerosol_turbidity_500nm=beta * 0.5**-1.3, dayofyear=80, alpha=1.3,
+            )  # fmt: skip
+            wavelengths = numpy.arange(380.0, 781.0, 5.0)
+            sums = {}
+            for name in ("dni", "dhi"):
+                spectrum = numpy.interp(wavelengths, spectra["wavelength"], numpy.ravel(spectra[name]))
+                sums[name] = (5.0 * spectrum[:, None] * observer(wavelengths)).sum(axis=0).tolist()
+            name = "SPCTRAL2" if turbidity == TURBIDITY else "SPCTRAL2, no aerosols"
+            values.setdefault(str(elevation), {})[name] = {"sun": sums["dni"], "sky": sums["dhi"]}
     (out / "spctral2.json").write_text(json.dumps(values))
 
 
@@ -132,7 +142,8 @@ def cycles(options, view, model, elevation, sun, image):
         **view, "threads": options.threads, "particles": str(image.with_suffix(".npy")), "radius": 1.0, "material": "matte",
         "color": [0.8] * 3, "bounces": 6, "crossings": 0, "image": str(image),
         "ground": {"size": 20000.0, "height": 0.0, "color": [ALBEDO] * 3},
-        "sky": {"model": MODELS[model], "sun": sun, "size": SUN_SIZE, "elevation": elevation, "azimuth": CYCLES_AZIMUTH},
+        "sky": {"model": MODELS[model], "sun": sun, "size": SUN_SIZE, "elevation": elevation, "azimuth": CYCLES_AZIMUTH,
+                "turbidity": TURBIDITY, "albedo": ALBEDO},
     }  # fmt: skip
     path = image.with_suffix(".scene.json")
     path.write_text(json.dumps(scene))
@@ -168,7 +179,8 @@ def directions(shape):
 
 def measure(options, model, elevation, out):
     """XYZ: irradiance of sun (on a surface that faces it) and sky, radiance at the zenith and at the horizon."""
-    panorama = render(options, "panorama", model, elevation, out)
+    has_sun = model != "cycles-hosek-wilkie"
+    panorama = render(options, "panorama", model, elevation, out, sun=has_sun)
     vectors, solid_angles = directions(panorama.shape)
     below = vectors[..., 2] < -0.5
     weights = (solid_angles * below)[..., None]
@@ -215,19 +227,17 @@ def main():
     for elevation in ELEVATIONS:
         models = {model: measure(options, model, elevation, out) for model in MODELS}
         brightness[elevation] = {m: (v["sky"] + v["sun"] * numpy.sin(numpy.radians(elevation)))[1] for m, v in models.items()}
-        if str(elevation) in published:
-            models["SPCTRAL2"] = {name: numpy.array(xyz) for name, xyz in published[str(elevation)].items()}
+        for name, values in published.get(str(elevation), {}).items():
+            models[name] = {part: numpy.array(xyz) for part, xyz in values.items()}
         for model, values in models.items():
             direct = values["sun"][1] * numpy.sin(numpy.radians(elevation))
-            cells = [f"{elevation:g}", model, f"{values['sky'][1] / (values['sky'][1] + direct):.2f}"]
+            share = values["sky"][1] / (values["sky"][1] + direct)
+            cells = [f"{elevation:g}", model, f"{share:.2f}"]
             for name in ("sun", "sky", "zenith", "horizon", "opposite"):
-                if name in values:
-                    x, y = chromaticity(values[name])
-                    cells.append(f"{x:.3f} {y:.3f} ({temperature(values[name]):.0f} K, {above_daylight(values[name]):+.3f})")
-                else:
-                    cells.append("")
-            if "zenith" in values:
-                cells.append(f"{values['horizon'][1] / values['zenith'][1]:.1f}")
+                # Too little light of the sun is a difference of two noisy numbers
+                is_known = name in values and (name != "sun" or share < 0.985 or model.startswith("SPCTRAL2"))
+                cells.append(color_text(values[name]) if is_known else "")
+            cells.append(f"{values['horizon'][1] / values['zenith'][1]:.1f}" if "zenith" in values else "")
             lines.append("| " + " | ".join(cells) + " |")
     print("| elevation | model | sky / all light on the ground | sun x y (K, dy) | sky on the ground | zenith | horizon beside the sun | opposite | horizon / zenith |")
     print("\n".join(lines))
