@@ -1,4 +1,4 @@
-"""Renders one scene of path_tracing.py, equal_time.py or sky_models.py with Cycles on the CPU: python cycles_scene.py scene.json
+"""Renders one scene of the other scripts with Cycles on the CPU: python cycles_scene.py scene.json
 
 The scene has z up. Prints the seconds of the render without start-up as JSON.
 """
@@ -258,12 +258,16 @@ def main():
     settle(scene)
     user, wall = user_seconds(), time.perf_counter()
     bpy.ops.render.render(write_still=True)
-    print(json.dumps({
-        "blender": bpy.app.version_string,
-        "render_user_s": user_seconds() - user,
-        "render_wall_s": time.perf_counter() - wall,
-        "peak_MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
-    }))
+    print(
+        json.dumps(
+            {
+                "blender": bpy.app.version_string,
+                "render_user_s": user_seconds() - user,
+                "render_wall_s": time.perf_counter() - wall,
+                "peak_MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Compares the noise of spherule and Cycles at equal CPU time: five scenes in three environments, with and without denoisers.
+"""Noise of spherule and Cycles at equal CPU time: five scenes, three environments, with and without denoisers.
 
     pip install bpy pysplashsurf numpy OpenEXR pillow
     python docs/compare/equal_time.py dam_break_frame_23_24389_particles.bgeo out --spherule target/release/spherule
@@ -28,12 +28,26 @@ SPRAY = {"neighbours": 6, "support": 4.0 * RADIUS, "radius": 0.5 * RADIUS, "colo
 SCENES = {
     "beads": {"material": "matte", "color": [0.30, 0.45, 0.65], "bounces": 6, **DAM},
     "metal": {"material": "metal", "color": [0.95, 0.79, 0.55], "roughness": 0.3, "bounces": 6, **DAM},
-    "glass": {"material": "glass", "ior": 1.5, "bounces": 6, "crossings": 16,
-              "eye": [0.0, -5.2, 2.3], "look_at": [0.0, 0.0, 0.25], "fov": 26.0},
+    "glass": {
+        "material": "glass",
+        "ior": 1.5,
+        "bounces": 6,
+        "crossings": 16,
+        "eye": [0.0, -5.2, 2.3],
+        "look_at": [0.0, 0.0, 0.25],
+        "fov": 26.0,
+    },
     "water": {"material": "water", "ior": 1.333, "bounces": 6, "crossings": 16, **DAM},
-    "cornell": {"material": "matte", "color": [0.8, 0.8, 0.8], "bounces": 6, "size": [144, 144],
-                "eye": [0.0, -4.6, 1.0], "look_at": [0.0, 0.0, 1.0], "fov": 31.0},
-}  # fmt: skip
+    "cornell": {
+        "material": "matte",
+        "color": [0.8, 0.8, 0.8],
+        "bounces": 6,
+        "size": [144, 144],
+        "eye": [0.0, -4.6, 1.0],
+        "look_at": [0.0, 0.0, 1.0],
+        "fov": 31.0,
+    },
+}
 ENVIRONMENTS = {
     "studio": {"intensity": 1.0},
     "outdoor": {"intensity": 1.0},
@@ -75,7 +89,9 @@ def write_outdoor(path):
         # The centre of the image is what a camera at -y sees, +y
         cosine = numpy.cos(lat) * (numpy.sin(lon) * sun[0] + numpy.cos(lon) * sun[1]) + numpy.sin(lat) * sun[2]
         up = numpy.sin(lat)[..., None]
-        sky = numpy.where(up > 0, [0.50, 0.55, 0.62] + numpy.clip(up, 0, 1) ** 0.5 * [-0.38, -0.32, -0.15], [0.20, 0.18, 0.16])
+        sky = numpy.where(
+            up > 0, [0.50, 0.55, 0.62] + numpy.clip(up, 0, 1) ** 0.5 * [-0.38, -0.32, -0.15], [0.20, 0.18, 0.16]
+        )
         sky = sky + numpy.exp(30.0 * (cosine - 1.0))[..., None] * [0.9, 0.8, 0.6] * (up > 0)
         sky = sky + (cosine > numpy.cos(0.5 * size))[..., None] * radiance
         pixels[row] = sky.reshape(fine, width, fine, 3).mean(axis=(0, 2))
@@ -137,6 +153,7 @@ def write_spheres(path, spheres):
 
 def write_cornell(out):
     """The walls and a box of the Cornell box, which is open towards the camera, as meshes of both programs."""
+
     def quads(name, faces):
         corners = [corner for face in faces for corner in face]
         lines = ["v {} {} {}".format(*corner) for corner in corners]
@@ -151,8 +168,13 @@ def write_cornell(out):
     left = [(-1, -1, 0), (-1, 1, 0), (-1, 1, 2), (-1, -1, 2)]
     right = [(1, y, z) for _, y, z in left]
     turn = numpy.radians(20.0)
-    base = [(-0.4 + 0.3 * (x * numpy.cos(turn) - y * numpy.sin(turn)), 0.3 + 0.3 * (x * numpy.sin(turn) + y * numpy.cos(turn)))
-            for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
+    base = [
+        (
+            -0.4 + 0.3 * (x * numpy.cos(turn) - y * numpy.sin(turn)),
+            0.3 + 0.3 * (x * numpy.sin(turn) + y * numpy.cos(turn)),
+        )
+        for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    ]
     sides = [[(*base[i], 0), (*base[(i + 1) % 4], 0), (*base[(i + 1) % 4], 1.2), (*base[i], 1.2)] for i in range(4)]
     box = [*sides, [(*corner, 1.2) for corner in base]]
     return [
@@ -163,8 +185,16 @@ def write_cornell(out):
     ]
 
 
-LAMP = {"type": "rect", "position": [0.0, 0.0, 1.99], "direction": [0.0, 0.0, -1.0], "width": 0.6, "height": 0.6,
-        "color": [1.0, 0.85, 0.65], "intensity": 7.0, "visible": True}  # fmt: skip
+LAMP = {
+    "type": "rect",
+    "position": [0.0, 0.0, 1.99],
+    "direction": [0.0, 0.0, -1.0],
+    "width": 0.6,
+    "height": 0.6,
+    "color": [1.0, 0.85, 0.65],
+    "intensity": 7.0,
+    "visible": True,
+}
 
 
 def write_inputs(options, out):
@@ -193,8 +223,12 @@ def scene_of(name, environment, options, out):
     if name == "glass":
         scene["particles"] = str(out / "balls.npy")
     if name == "water":
-        scene |= {"mesh": str(out / "body.obj"), "spray": str(out / "spray.npy"), "spray_radius": SPRAY["radius"],
-                  "spray_color": SPRAY["color"]}  # fmt: skip
+        scene |= {
+            "mesh": str(out / "body.obj"),
+            "spray": str(out / "spray.npy"),
+            "spray_radius": SPRAY["radius"],
+            "spray_color": SPRAY["color"],
+        }
     return scene
 
 
@@ -240,10 +274,31 @@ def spherule(options, scene, image):
         particles, radius = str(Path(particles).with_suffix(".csv")), []
     width, height = scene["size"]
     command = [
-        options.spherule, "still", particles, "-o", image, "--up", "z", *radius, "--channels", "RGBA",
-        "--integrator", "path", "--bounces", scene["bounces"], "--samples", scene["samples"], "--seed", scene["seed"],
-        "--width", width, "--height", height, "--threads", options.threads,
-    ]  # fmt: skip
+        options.spherule,
+        "still",
+        particles,
+        "-o",
+        image,
+        "--up",
+        "z",
+        *radius,
+        "--channels",
+        "RGBA",
+        "--integrator",
+        "path",
+        "--bounces",
+        scene["bounces"],
+        "--samples",
+        scene["samples"],
+        "--seed",
+        scene["seed"],
+        "--width",
+        width,
+        "--height",
+        height,
+        "--threads",
+        options.threads,
+    ]
     for key, value in settings.items():
         command += ["--set", f"{key}={value if isinstance(value, str) else json.dumps(value)}"]
     return command
@@ -366,22 +421,34 @@ def print_tables(options, out):
     print("| scene | environment | reference samples | mean radiance spherule | Cycles | difference | 8x8 pixels |")
     for key, row in rows.items():
         ours, theirs = row["means"]
-        print(f"| {key.replace('-', ' | ')} | {row['spherule reference']}, {row['cycles reference']} | {ours:.4f} | "
-              f"{theirs:.4f} | {100 * (ours / theirs - 1):+.2f} % | {row['blocks']:.2f} % |")  # fmt: skip
-    print("| scene | environment | samples | CPU s | RMSE spherule | Cycles | relative MSE spherule | Cycles | ratio | ratio of relative MSE | CPU s of 512 samples | ratio |")
+        print(
+            f"| {key.replace('-', ' | ')} | {row['spherule reference']}, {row['cycles reference']} | {ours:.4f} | "
+            f"{theirs:.4f} | {100 * (ours / theirs - 1):+.2f} % | {row['blocks']:.2f} % |"
+        )
+    print(
+        "| scene | environment | samples | CPU s | RMSE spherule | Cycles | relative MSE spherule | Cycles | "
+        "ratio | ratio of relative MSE | CPU s of 512 samples | ratio |"
+    )
     for key, row in rows.items():
         samples = results[key]["samples"]
         a, b = row["spherule", "noisy"], row["cycles", "noisy"]
-        print(f"| {key.replace('-', ' | ')} | {samples['spherule']}, {samples['cycles']} | "
-              f"{row['spherule', 'noisy', 'seconds']:.2f}, {row['cycles', 'noisy', 'seconds']:.2f} | {a[0]:.2f} | "
-              f"{b[0]:.2f} | {a[1]:.2g} | {b[1]:.2g} | {row['ratio']:.1f} | {row['relative ratio']:.1f} | "
-              f"{row['spent'][0]:.1f}, {row['spent'][1]:.1f} | {row['ratio of many']:.1f} |")  # fmt: skip
-    print("| scene | environment | CPU s | RMSE spherule | Cycles | relative MSE spherule | Cycles | RMSE spherule / Cycles |")
+        print(
+            f"| {key.replace('-', ' | ')} | {samples['spherule']}, {samples['cycles']} | "
+            f"{row['spherule', 'noisy', 'seconds']:.2f}, {row['cycles', 'noisy', 'seconds']:.2f} | {a[0]:.2f} | "
+            f"{b[0]:.2f} | {a[1]:.2g} | {b[1]:.2g} | {row['ratio']:.1f} | {row['relative ratio']:.1f} | "
+            f"{row['spent'][0]:.1f}, {row['spent'][1]:.1f} | {row['ratio of many']:.1f} |"
+        )
+    print(
+        "| scene | environment | CPU s | RMSE spherule | Cycles | relative MSE spherule | Cycles | "
+        "RMSE spherule / Cycles |"
+    )
     for key, row in rows.items():
         a, b = row["spherule", "denoised"], row["cycles", "denoised"]
-        print(f"| {key.replace('-', ' | ')} | {row['spherule', 'denoised', 'seconds']:.2f}, "
-              f"{row['cycles', 'denoised', 'seconds']:.2f} | {a[0]:.2f} | {b[0]:.2f} | {a[1]:.2g} | {b[1]:.2g} | "
-              f"{a[0] / b[0]:.2f} |")  # fmt: skip
+        print(
+            f"| {key.replace('-', ' | ')} | {row['spherule', 'denoised', 'seconds']:.2f}, "
+            f"{row['cycles', 'denoised', 'seconds']:.2f} | {a[0]:.2f} | {b[0]:.2f} | {a[1]:.2g} | {b[1]:.2g} | "
+            f"{a[0] / b[0]:.2f} |"
+        )
     if rows:
         write_sheet(rows, out)
 
@@ -404,8 +471,14 @@ def write_sheet(rows, out):
     lines = [numpy.pad(line, ((0, 0), (0, width - line.shape[1]), (0, 0)), constant_values=1.0) for line in lines]
     path_tracing.write_png(numpy.concatenate(lines, axis=0), out / "sheet.png")
     for key, row in rows.items():
-        picture = numpy.concatenate([numpy.concatenate(row["shown"][:2], axis=1), numpy.concatenate(row["shown"][2:], axis=1),
-                                     numpy.concatenate(row["references"], axis=1)], axis=0)  # fmt: skip
+        picture = numpy.concatenate(
+            [
+                numpy.concatenate(row["shown"][:2], axis=1),
+                numpy.concatenate(row["shown"][2:], axis=1),
+                numpy.concatenate(row["references"], axis=1),
+            ],
+            axis=0,
+        )
         path_tracing.write_png(picture, out / f"{key}.png")
     Image.open(out / "sheet.png").save(out / "sheet.jpg", quality=85)
 
@@ -428,7 +501,12 @@ def main():
                 results.write_text(json.dumps(known, indent=1))
         for part in range(options.reference):
             for name, environment in pairs:
-                scene = {**scene_of(name, environment, options, out), "samples": PART, "denoise": False, "seed": 100 + part}
+                scene = {
+                    **scene_of(name, environment, options, out),
+                    "samples": PART,
+                    "denoise": False,
+                    "seed": 100 + part,
+                }
                 for program in ("spherule", "cycles"):
                     image = out / f"{name}-{environment}-{program}-reference-{part}.exr"
                     if not image.exists():

@@ -1,10 +1,12 @@
 """Compares how much denoised sequences of spherule and Cycles flicker where the scene does not change.
 
-    python docs/compare/flicker.py dam_break_frame_23_24389_particles.bgeo 'examples/dam-break/*.bgeo' out --spherule target/release/spherule
+    python docs/compare/flicker.py dam_break_frame_23_24389_particles.bgeo 'examples/dam-break/*.bgeo' out \\
+        --spherule target/release/spherule
 
-Three sequences of 24 pictures with new noise in each: `static` (the same picture), `turntable` (the camera goes around the
-beads, 15 degrees per picture) and `splash` (the frames of the pattern forwards and backwards, as water). `out` is the directory of
-equal_time.py, whose inputs and numbers of samples are used. Prints the table of docs/measurements/cycles.md.
+Three sequences of 24 pictures with new noise in each: `static` (the same picture), `turntable` (the camera goes around
+the beads, 15 degrees per picture) and `splash` (the frames of the pattern forwards and backwards, as water). `out` is
+the directory of equal_time.py, whose inputs and numbers of samples are used. Prints the table of
+docs/measurements/cycles.md.
 """
 
 import argparse
@@ -82,7 +84,7 @@ def scenes(sequence, options, out):
 
 
 def still_pixels(sequences):
-    """Pixels of the ground whose mean of 5x5 pixels, and of both programs, changes by less than 5 bytes in a sequence."""
+    """Pixels of the ground whose mean of 5x5 pixels and of both programs changes by less than 5 bytes."""
     mean = numpy.mean(list(sequences.values()), axis=0)
     padded = numpy.pad(mean, ((0, 0), (2, 2), (2, 2), (0, 0)), mode="edge")
     height, width = mean.shape[1:3]
@@ -111,7 +113,12 @@ def main():
                 seeds = "one-seed-" if options.one_seed else ""
                 image = out / f"{sequence}-{program}-{samples[program]}-{seeds}{index:02}.exr"
                 if not image.exists():
-                    settings = {**scene, "samples": samples[program], "denoise": True, "seed": 1 if options.one_seed else 1 + index}
+                    settings = {
+                        **scene,
+                        "samples": samples[program],
+                        "denoise": True,
+                        "seed": 1 if options.one_seed else 1 + index,
+                    }
                     seconds[program].append(equal_time.render(program, options, settings, image))
                 pictures.append(srgb_bytes(read_exr(image)))
             sequences_of[program] = numpy.array(pictures)
@@ -119,8 +126,12 @@ def main():
         for program, pictures in sequences_of.items():
             changes = numpy.abs(numpy.diff(pictures, axis=0)).mean(axis=-1)
             time = f"{numpy.mean(seconds[program]):.2f}" if seconds[program] else ""
-            print(f"| {sequence} | {program} | {samples[program]} | {time} | {100 * still.mean():.0f} % | {changes[:, still].mean():.2f} | "
-                  f"{numpy.percentile(changes[:, still], 99):.2f} | {changes.mean():.2f} |", flush=True)  # fmt: skip
+            print(
+                f"| {sequence} | {program} | {samples[program]} | {time} | {100 * still.mean():.0f} % | "
+                f"{changes[:, still].mean():.2f} | "
+                f"{numpy.percentile(changes[:, still], 99):.2f} | {changes.mean():.2f} |",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -3,9 +3,9 @@
     pip install bpy numpy OpenEXR pillow
     python docs/compare/sky_models.py out --spherule target/release/spherule
 
-Prints the table of docs/measurements/cycles.md and writes a contact sheet. SPCTRAL2 is that of pvlib, which needs a newer
-numpy than bpy: `python docs/compare/sky_models.py out --spectral` in an environment with pvlib writes its values to
-the output directory first.
+Prints the table of docs/measurements/cycles.md and writes a contact sheet. SPCTRAL2 is that of pvlib, which needs a
+newer numpy than bpy: `python docs/compare/sky_models.py out --spectral` in an environment with pvlib writes its values
+to the output directory first.
 """
 
 import argparse
@@ -21,9 +21,15 @@ ALBEDO = 0.2
 SUN_SIZE = 0.545
 # Azimuths of the sun: to the left and behind the sphere
 SPHERULE_AZIMUTH, CYCLES_AZIMUTH = 225.0, 135.0
-MODELS = {"spherule": None, "cycles": "MULTIPLE_SCATTERING", "cycles-single": "SINGLE_SCATTERING",
-          "cycles-hosek-wilkie": "HOSEK_WILKIE"}  # fmt: skip
-XYZ_OF_RGB = numpy.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
+MODELS = {
+    "spherule": None,
+    "cycles": "MULTIPLE_SCATTERING",
+    "cycles-single": "SINGLE_SCATTERING",
+    "cycles-hosek-wilkie": "HOSEK_WILKIE",
+}
+XYZ_OF_RGB = numpy.array(
+    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+)
 
 
 def arguments():
@@ -46,7 +52,12 @@ def temperature(xyz):
     """Correlated colour temperature in K (Hernandez-Andres, Lee and Romero, 1999)."""
     x, y = chromaticity(xyz)
     n = (x - 0.3366) / (y - 0.1735)
-    low = -949.86315 + 6253.80338 * numpy.exp(-n / 0.92159) + 28.70599 * numpy.exp(-n / 0.20039) + 0.00004 * numpy.exp(-n / 0.07125)
+    low = (
+        -949.86315
+        + 6253.80338 * numpy.exp(-n / 0.92159)
+        + 28.70599 * numpy.exp(-n / 0.20039)
+        + 0.00004 * numpy.exp(-n / 0.07125)
+    )
     if low <= 50000:
         return low
     n = (x - 0.3356) / (y - 0.1691)
@@ -79,10 +90,18 @@ def write_spectral(out):
             zenith = 90.0 - elevation
             beta = max(0.04608 * turbidity - 0.04586, 0.0)
             spectra = pvlib.spectrum.spectrl2(
-                apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=ALBEDO, surface_pressure=101325.0,
-                relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith, "kastenyoung1989"), ozone=0.35,
-                precipitable_water=1.5, aerosol_turbidity_500nm=beta * 0.5**-1.3, dayofyear=80, alpha=1.3,
-            )  # fmt: skip
+                apparent_zenith=zenith,
+                aoi=zenith,
+                surface_tilt=0.0,
+                ground_albedo=ALBEDO,
+                surface_pressure=101325.0,
+                relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith, "kastenyoung1989"),
+                ozone=0.35,
+                precipitable_water=1.5,
+                aerosol_turbidity_500nm=beta * 0.5**-1.3,
+                dayofyear=80,
+                alpha=1.3,
+            )
             wavelengths = numpy.arange(380.0, 781.0, 5.0)
             sums = {}
             for name in ("dni", "dhi"):
@@ -108,27 +127,66 @@ def observer(wavelengths):
 # Pictures
 
 
-PANORAMA = {"size": [256, 128], "eye": [0.0, 0.0, 1.0], "look_at": [0.0, 1.0, 1.0], "fov": 45.0, "samples": 64,
-            "sphere": [0.0, 0.0, 0.001, 0.001], "panorama": True}  # fmt: skip
-PICTURE = {"size": [240, 135], "eye": [0.0, -4.2, 1.0], "look_at": [0.0, 0.0, 0.85], "fov": 38.0, "samples": 64,
-           "sphere": [0.0, 0.0, 0.5, 0.5], "panorama": False}  # fmt: skip
+PANORAMA = {
+    "size": [256, 128],
+    "eye": [0.0, 0.0, 1.0],
+    "look_at": [0.0, 1.0, 1.0],
+    "fov": 45.0,
+    "samples": 64,
+    "sphere": [0.0, 0.0, 0.001, 0.001],
+    "panorama": True,
+}
+PICTURE = {
+    "size": [240, 135],
+    "eye": [0.0, -4.2, 1.0],
+    "look_at": [0.0, 0.0, 0.85],
+    "fov": 38.0,
+    "samples": 64,
+    "sphere": [0.0, 0.0, 0.5, 0.5],
+    "panorama": False,
+}
 
 
 def spherule(options, view, elevation, image):
     csv = image.with_suffix(".csv")
     csv.write_text("x,y,z,radius\n" + ",".join(map(str, view["sphere"])) + "\n")
     settings = {
-        "camera.eye": view["eye"], "camera.look_at": view["look_at"], "image.filter": "box", "render.denoise": False,
-        "environment.type": "sky", "environment.visible": True, "environment.turbidity": TURBIDITY,
-        "environment.albedo": ALBEDO, "material.type": "matte", "material.color": [0.8] * 3, "render.ground": "plain",
-        "render.ground_color": [ALBEDO] * 3, "render.ground_height": 0.0, "render.ground_wetness": 0.0,
+        "camera.eye": view["eye"],
+        "camera.look_at": view["look_at"],
+        "image.filter": "box",
+        "render.denoise": False,
+        "environment.type": "sky",
+        "environment.visible": True,
+        "environment.turbidity": TURBIDITY,
+        "environment.albedo": ALBEDO,
+        "material.type": "matte",
+        "material.color": [0.8] * 3,
+        "render.ground": "plain",
+        "render.ground_color": [ALBEDO] * 3,
+        "render.ground_height": 0.0,
+        "render.ground_wetness": 0.0,
         "environment.sun": f"{{elevation={elevation},azimuth={SPHERULE_AZIMUTH},size={SUN_SIZE}}}",
-    }  # fmt: skip
+    }
     settings |= {"camera.projection": "equirectangular"} if view["panorama"] else {"camera.fov": view["fov"]}
     command = [
-        options.spherule, "still", csv, "-o", image, "--up", "z", "--channels", "RGBA", "--samples", view["samples"],
-        "--width", view["size"][0], "--height", view["size"][1], "--threads", options.threads,
-    ]  # fmt: skip
+        options.spherule,
+        "still",
+        csv,
+        "-o",
+        image,
+        "--up",
+        "z",
+        "--channels",
+        "RGBA",
+        "--samples",
+        view["samples"],
+        "--width",
+        view["size"][0],
+        "--height",
+        view["size"][1],
+        "--threads",
+        options.threads,
+    ]
     for key, value in settings.items():
         command += ["--set", f"{key}={value if isinstance(value, str) else json.dumps(value)}"]
     return command
@@ -139,12 +197,26 @@ def cycles(options, view, model, elevation, sun, image):
 
     numpy.save(image.with_suffix(".npy"), numpy.array([view["sphere"]], numpy.float32))
     scene = {
-        **view, "threads": options.threads, "particles": str(image.with_suffix(".npy")), "radius": 1.0, "material": "matte",
-        "color": [0.8] * 3, "bounces": 6, "crossings": 0, "image": str(image),
+        **view,
+        "threads": options.threads,
+        "particles": str(image.with_suffix(".npy")),
+        "radius": 1.0,
+        "material": "matte",
+        "color": [0.8] * 3,
+        "bounces": 6,
+        "crossings": 0,
+        "image": str(image),
         "ground": {"size": 20000.0, "height": 0.0, "color": [ALBEDO] * 3},
-        "sky": {"model": MODELS[model], "sun": sun, "size": SUN_SIZE, "elevation": elevation, "azimuth": CYCLES_AZIMUTH,
-                "turbidity": TURBIDITY, "albedo": ALBEDO},
-    }  # fmt: skip
+        "sky": {
+            "model": MODELS[model],
+            "sun": sun,
+            "size": SUN_SIZE,
+            "elevation": elevation,
+            "azimuth": CYCLES_AZIMUTH,
+            "turbidity": TURBIDITY,
+            "albedo": ALBEDO,
+        },
+    }
     path = image.with_suffix(".scene.json")
     path.write_text(json.dumps(scene))
     return [sys.executable, HERE / "cycles_scene.py", path]
@@ -197,7 +269,7 @@ def measure(options, model, elevation, out):
         # Without its disc, the sky alone lights the ground
         dark = render(options, "panorama", model, elevation, out, sun=False)
         integral, light = light, numpy.pi / ALBEDO * (dark * weights).sum(axis=(0, 1)) / weights.sum()
-        print(f"    {model}, {elevation}: integral of the sky / its light on the ground {integral.sum() / light.sum():.3f}")
+        print(f"    {model}, {elevation}: integral of the sky / its light {integral.sum() / light.sum():.3f}")
     away = vectors[..., :2] @ sun[:2] / numpy.cos(height)
     around = numpy.linalg.norm(vectors[..., :2], axis=-1)
     side = numpy.abs(away) < 0.5 * around  # at the sides of the sun
@@ -226,7 +298,9 @@ def main():
     lines, brightness = [], {}
     for elevation in ELEVATIONS:
         models = {model: measure(options, model, elevation, out) for model in MODELS}
-        brightness[elevation] = {m: (v["sky"] + v["sun"] * numpy.sin(numpy.radians(elevation)))[1] for m, v in models.items()}
+        brightness[elevation] = {
+            m: (v["sky"] + v["sun"] * numpy.sin(numpy.radians(elevation)))[1] for m, v in models.items()
+        }
         for name, values in published.get(str(elevation), {}).items():
             models[name] = {part: numpy.array(xyz) for part, xyz in values.items()}
         for model, values in models.items():
@@ -239,10 +313,17 @@ def main():
                 cells.append(color_text(values[name]) if is_known else "")
             cells.append(f"{values['horizon'][1] / values['zenith'][1]:.1f}" if "zenith" in values else "")
             lines.append("| " + " | ".join(cells) + " |")
-    print("| elevation | model | sky / all light on the ground | sun x y (K, dy) | sky on the ground | zenith | horizon beside the sun | opposite | horizon / zenith |")
+    print(
+        "| elevation | model | sky / all light on the ground | sun x y (K, dy) | "
+        "sky on the ground | zenith | horizon beside the sun | opposite | horizon / zenith |"
+    )
     print("\n".join(lines))
     for model in MODELS:
-        print(model, "luminance on the ground:", {e: round(b[model] / brightness[60.0][model], 4) for e, b in brightness.items()})
+        print(
+            model,
+            "luminance on the ground:",
+            {e: round(b[model] / brightness[60.0][model], 4) for e, b in brightness.items()},
+        )
     write_sheet(options, brightness, out)
 
 
