@@ -213,7 +213,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Grou
     let (of_ground, dark, kept) = match &scene.ground {
         // The cells of the photons are freed when the other maps are made
         Some(ground) if !is_catcher(ground) => {
-            let others = kept + (1 + groups) * sky::BYTES + wet::BYTES;
+            let others = kept + (1 + groups) * sky::bytes(settings) + wet::BYTES;
             let kept_others = (1 + groups) * sky::MAP_BYTES + wet::BYTES;
             (caustics.max(others), dark.max(others), kept + kept_others)
         }

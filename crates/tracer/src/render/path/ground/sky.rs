@@ -12,6 +12,7 @@ use crate::render::{
     ray_counts::RayCounts,
     sampler::PathSeed,
     scratch::{PacketScratch, Scratch},
+    settings::RenderSettings,
     stop::Stop,
     stream::{RayStreams, SegmentPacket},
 };
@@ -22,14 +23,24 @@ use spherule_tree::ray::Ray;
 /// Texels along an edge of the map.
 const SIDE: usize = 128;
 
+/// Paths of each texel in images with up to [`FEW_SAMPLES`] samples. More samples have more paths, up to
+/// [`MAX_PATHS`]: with a small light in the environment, fewer leave blotches that no number of samples removes.
+const MIN_PATHS: usize = 64;
+const MAX_PATHS: usize = 8 * MIN_PATHS;
+const FEW_SAMPLES: usize = 16;
+
 /// Paths of each texel.
-const PATHS: usize = 64;
+fn path_count(settings: &RenderSettings) -> usize {
+    (MIN_PATHS * (settings.samples as usize / FEW_SAMPLES)).clamp(MIN_PATHS, MAX_PATHS)
+}
 
 /// Height above the ground from which rays find it, as a fraction of the edge of the map.
 const START: f32 = 1e-5;
 
 /// Memory for the map before and after it is smoothed, and for the paths of a row on each of up to 64 threads.
-pub(super) const BYTES: u64 = (SIDE * (4 * SIDE + 64 * PATHS) * size_of::<Vec3>()) as u64;
+pub(super) fn bytes(settings: &RenderSettings) -> u64 {
+    (SIDE * (4 * SIDE + 64 * path_count(settings)) * size_of::<Vec3>()) as u64
+}
 
 /// Memory of a map.
 pub(super) const MAP_BYTES: u64 = (SIDE * SIDE * size_of::<Vec3>()) as u64;
@@ -84,16 +95,17 @@ fn trace_row(
         ..Layers::NONE
     };
     scratch.group.layers.layers = layers;
-    for _ in 0..SIDE * PATHS {
+    let paths = path_count(integrator.context.settings);
+    for _ in 0..SIDE * paths {
         scratch.group.push(0.0, 0.0);
     }
     // Trace them from the ground
     trace_batches(integrator, stop, &mut scratch, &|packets, scratch| {
         for number in packets {
             let (packet, segments) = (&mut *scratch.packet, &mut *scratch.camera);
-            aim(integrator, square, row, number, segments);
+            aim(integrator, square, row, (number, paths), segments);
             packet.groups.start(&layers);
-            reflect(integrator, segments, packet, &mut scratch.next);
+            reflect(integrator, segments, paths, packet, &mut scratch.next);
             scratch.group.radiance[number] = packet.radiance;
             let (split, groups) = (&packet.split, &packet.groups);
             scratch.group.layers.store(number, split, groups);
@@ -102,32 +114,32 @@ fn trace_row(
     })?;
     // Average the paths of each texel
     let radiance = |i: usize| lane3(&scratch.group.radiance[i / LANES], i % LANES);
-    let texels = means(&radiance);
-    let of_group = |group| means(&|path| scratch.group.layers.light_of_group(group, path));
+    let texels = means(paths, &radiance);
+    let of_group = |group| means(paths, &|path| scratch.group.layers.light_of_group(group, path));
     let groups = (0..usize::from(layers.light_groups)).map(of_group);
     Some(((texels, groups.collect()), scratch.packet.counts))
 }
 
-/// The mean radiance of the paths of each texel of a row.
-fn means(radiance: &dyn Fn(usize) -> Vec3) -> Vec<Vec3> {
+/// The mean radiance of the `count` paths of each texel of a row.
+fn means(count: usize, radiance: &dyn Fn(usize) -> Vec3) -> Vec<Vec3> {
     let texel = |texel: usize| {
-        let paths = texel * PATHS..(texel + 1) * PATHS;
-        paths.map(radiance).sum::<Vec3>() / PATHS as f32
+        let paths = texel * count..(texel + 1) * count;
+        paths.map(radiance).sum::<Vec3>() / count as f32
     };
     (0..SIDE).map(texel).collect()
 }
 
-/// Short rays straight down to the texel of packet `number` of a row.
+/// Short rays straight down to the texel of packet `number` of a row whose texels have so many `paths` each.
 #[expect(clippy::cast_possible_truncation, reason = "maps are small")]
 fn aim(
     integrator: &PathIntegrator<'_>,
     square: &Square,
     row: usize,
-    number: usize,
+    (number, paths): (usize, usize),
     segments: &mut SegmentPacket,
 ) {
-    const { assert!(PATHS.is_multiple_of(LANES), "a packet has one texel") };
-    let texel = number * LANES / PATHS;
+    const { assert!(MIN_PATHS.is_multiple_of(LANES), "a packet has one texel") };
+    let texel = number * LANES / paths;
     let center = square.point([texel, row].map(|i| (i as f32 + 0.5) / SIDE as f32));
     let above = center + START * square.edge * square.normal;
     segments.rays.reset();
@@ -152,11 +164,12 @@ fn aim(
 }
 
 /// Samples the light of the environment where the rays of `segments` hit the ground, as if it were white, and appends
-/// the rays that it reflects to `next`.
+/// the rays that it reflects to `next`. Texels have so many `paths` each.
 #[expect(clippy::cast_possible_truncation, reason = "there are few paths")]
 fn reflect(
     integrator: &PathIntegrator<'_>,
     segments: &mut SegmentPacket,
+    paths: usize,
     packet: &mut PacketScratch,
     next: &mut RayStreams,
 ) {
@@ -167,7 +180,7 @@ fn reflect(
         segments,
         depth: 1,
         lanes: packet.hits.lanes_of(MaterialId::GROUND),
-        sample: segments.sample.map(|sample| sample % PATHS as u32),
+        sample: segments.sample.map(|sample| sample % paths as u32),
     };
     let white = splat3(Vec3::ONE);
     (packet.base, packet.weight) = (white, white);
