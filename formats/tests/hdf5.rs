@@ -268,9 +268,14 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
     assert_eq!(ids_of(one).0, expected[1..]);
     // A file with the values is missing
     let dir = directory_of(&ALL[..2]);
-    let (found, notes) = ids_of(SequenceInput::Directory(dir.path().into()));
+    let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
+    let error = sequence.expect("one frame").load_raw(0).expect_err("half of it").to_string();
+    assert!(error.contains("snap_003.1.hdf5: does not exist; "), "{error}");
+    assert!(error.contains("has 2 files, of which there are 1: copy the others there"), "{error}");
+    // One is read alone by its name
+    let (found, notes) = ids_of(SequenceInput::Files(vec![dir.path().join(ALL[1])]));
     assert_eq!(found[0].len(), 23);
-    assert!(notes.contains("only 1 of them exist"), "{notes}");
+    assert!(notes.contains("of 2 files, but only 1 of them is used"), "{notes}");
     // All are
     let dir = directory_of(&ALL[..1]);
     let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));

@@ -85,6 +85,7 @@ impl Sequence {
     /// Reads frame `index` as it is in the files.
     pub(super) fn read_parts(&self, index: usize) -> Result<Loaded, FrameError> {
         let frame = &self.frames[index];
+        self.missing_pieces.check(frame)?;
         let mut notes = Vec::new();
         let (mut all_bytes, mut content_bytes) = (0, 0);
         // Read the parts one after the other

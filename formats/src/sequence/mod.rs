@@ -52,6 +52,7 @@ use load::{CachedFile, stamp};
 use name::FileName;
 use notes::{note_gaps, note_missing_parts};
 use pattern::Pattern;
+use pieces::MissingPieces;
 use placement::ReferenceCell;
 
 /// Whether the file at `path` has no particles itself, but stands for others: it is a list of files, or a snapshot of
@@ -122,6 +123,8 @@ pub struct Sequence {
     reference: ReferenceCell,
     /// What there is with all parts, if some are left out unless they are named.
     all_parts: Option<AllParts>,
+    /// Files that steps lack.
+    missing_pieces: MissingPieces,
 }
 
 /// Frames, names and notes of a sequence of all parts.
@@ -161,19 +164,22 @@ impl Sequence {
     ) -> Result<Self, SequenceError> {
         let mut notes = Vec::new();
         // Find the files, and which of them belong together
-        let group = match input {
+        let (group, missing_pieces) = match input {
             SequenceInput::Directory(path) => {
-                let names = pieces::find_pieces(scan::directory(path)?, &mut notes);
-                group::pick(path, names, &mut notes)?
+                let (names, missing) =
+                    pieces::find_pieces(input, scan::directory(path)?, &mut notes);
+                (group::pick(path, names, &mut notes)?, missing)
             }
             SequenceInput::Pattern(path) => {
                 let pattern = Pattern::parse(path)?;
-                let names = pieces::find_pieces(scan::fitting(&pattern, path)?, &mut notes);
-                group::pick(&pattern.directory, names, &mut notes)?
+                let names = scan::fitting(&pattern, path)?;
+                let (names, missing) = pieces::find_pieces(input, names, &mut notes);
+                (group::pick(&pattern.directory, names, &mut notes)?, missing)
             }
             SequenceInput::Files(paths) => {
-                let names = pieces::find_pieces(listed_names(paths)?, &mut notes);
-                group::listed(names, &mut notes)?
+                let names = listed_names(paths)?;
+                let (names, missing) = pieces::find_pieces(input, names, &mut notes);
+                (group::listed(names, &mut notes)?, missing)
             }
         };
         // Follow lists of files
@@ -181,7 +187,8 @@ impl Sequence {
             let expansion = collection::expand(&group, settings, &mut notes)?;
             return Ok(Self::from_expansion(expansion, notes, settings.budget));
         }
-        Ok(Self::from_group(group, notes, settings.budget))
+        let sequence = Self::from_group(group, notes, settings.budget);
+        Ok(Self { missing_pieces, ..sequence })
     }
 
     fn from_expansion(expansion: Expansion, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
@@ -198,6 +205,7 @@ impl Sequence {
             placement: Placement::default(),
             reference: ReferenceCell::default(),
             all_parts: None,
+            missing_pieces: MissingPieces::default(),
         }
     }
 
@@ -237,6 +245,7 @@ impl Sequence {
             placement: Placement::default(),
             reference: ReferenceCell::default(),
             all_parts,
+            missing_pieces: MissingPieces::default(),
         }
     }
 
@@ -423,10 +432,12 @@ impl Sequence {
     /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a
     /// topology or a placement.
     pub fn lone_file(&self, index: usize) -> Option<&Path> {
-        let [part] = self.frames.get(index)?.parts.as_slice() else {
+        let frame = self.frames.get(index)?;
+        let [part] = frame.parts.as_slice() else {
             return None;
         };
-        let is_alone = self.parts.len() < 2 && part.step.is_none();
+        let is_whole = self.missing_pieces.check(frame).is_ok();
+        let is_alone = self.parts.len() < 2 && part.step.is_none() && is_whole;
         let is_unchanged = self.topology.is_none() && self.placement.is_none();
         (is_alone && is_unchanged).then_some(&part.path)
     }
