@@ -101,6 +101,9 @@ impl Reader for Las {
         let name = if header.is_compressed { "LAZ" } else { "LAS" };
         let mut notes =
             vec![format!("{name} 1.{}, format of points {}", header.minor, header.format)];
+        if header.is_compressed && header.format > 5 {
+            notes.push("times of compressed points (gps_time) are not read".to_owned());
+        }
         let (_, left_out) = header.extra_columns(bytes);
         if !left_out.is_empty() {
             let names = left_out.join(", ");
@@ -213,7 +216,10 @@ impl LasHeader {
             ("color", self.color_type(bytes, color), 3, color),
             ("nir", ScalarType::U16, 1, infrared),
         ];
-        for (name, scalar, components, offset) in optional.into_iter().filter(|column| column.3 > 0)
+        let is_there =
+            |name: &str, offset| offset > 0 && !(self.is_compressed && name == "gps_time");
+        for (name, scalar, components, offset) in
+            optional.into_iter().filter(|column| is_there(column.0, column.3))
         {
             let mut column = self.column(name, scalar, components, offset);
             if name == "color" {
@@ -429,7 +435,11 @@ mod tests {
         };
         for (place, value, message) in [
             (0, &b"X"[..], "begins with LASF"),
-            (POINT_FORMAT, &[3 | COMPRESSED], "there is no record `laszip encoded`"),
+            (
+                POINT_FORMAT,
+                &[3 | COMPRESSED],
+                "whose times cannot be decoded safely; decompress it",
+            ),
             (POINT_FORMAT, &[11], "formats 0 to 10"),
             (105, &[10, 0], "points of 10 bytes, format 3 has 34"),
             (107, &[255; 4], "4294967295 particles need"),

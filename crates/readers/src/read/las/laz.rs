@@ -5,11 +5,15 @@
 //! it is decoded by itself, and the table of chunks is not needed.
 //!
 //! The crate allocates what a file says, and panics on some damage. So the items have to be those of the format of points,
-//! lengths are compared with the bytes that are there before it sees them, and panics become errors.
+//! lengths are compared with the bytes that are there before it sees them, and panics become errors. It decodes times by
+//! recursion as deep as a file wants, so that damage overflows the stack, which is not an error but an end of the process.
+//! Therefore times of formats 6 to 10, which are a layer, are passed over, and formats 1 and 3 to 5 are refused.
 
 use std::io::Cursor;
 
-use laz::{LasZipDecompressor, LazItem, LazItemRecordBuilder, LazItemType, LazVlr};
+use laz::{
+    DecompressionSelection, LasZipDecompressor, LazItem, LazItemRecordBuilder, LazItemType, LazVlr,
+};
 
 use super::{LasHeader, offsets};
 use crate::read::CUT_SHORT;
@@ -18,6 +22,8 @@ use spherule_frame::{MemoryBudget, ParseError};
 
 /// Most points for a byte: of points that are all equal, LASzip needs nearly none.
 const MAX_POINTS_EACH: usize = 1024;
+/// Most extra bytes of a point: the decoder holds some kilobytes for each. Files have a few dozen.
+const MAX_EXTRA: u16 = 1024;
 /// Bytes of the place of the table of chunks, and of a table without chunks.
 const TABLE: usize = 8;
 /// Where the record has the number of points of a chunk.
@@ -38,12 +44,20 @@ pub(super) fn unpack(
     if header.count > data.len().saturating_mul(MAX_POINTS_EACH) {
         let what =
             format!("{} compressed points in {} bytes: {CUT_SHORT}", header.count, data.len());
-        return Err(ParseError::malformed(header.start, what));
+        return Err(ParseError::malformed(header.start.min(bytes.len()), what));
     }
     let points_len = header.count.saturating_mul(header.record);
     // The result, and a copy of compressed bytes
     let need = header.start.saturating_add(points_len).saturating_add(data.len());
     budget.check(need as u64, "its points, decompressed, are")?;
+    if matches!(header.format, 1 | 3 | 4 | 5) {
+        let what = format!(
+            "a LAZ file with points of format {}, whose times cannot be decoded safely; decompress it (`pdal translate in.laz \
+             out.las`, or `laszip -i in.laz -o out.las`)",
+            header.format
+        );
+        return Err(ParseError::unsupported(what));
+    }
     let settings = Settings::read(bytes, header)?;
     let mut unpacked = bytes.get(..header.start).unwrap_or_default().to_vec();
     unpacked.resize(header.start + points_len, 0);
@@ -72,13 +86,19 @@ impl Settings {
                 "the points are compressed, but there is no record `{}`: {CUT_SHORT}",
                 LazVlr::USER_ID
             );
-            return Err(ParseError::malformed(header.len, what));
+            return Err(ParseError::malformed(header.len.min(bytes.len()), what));
         };
         let bad = |what: String| ParseError::malformed(at, format!("the record of LASzip: {what}"));
         let vlr = LazVlr::from_buffer(stored).map_err(|error| bad(error.to_string()))?;
         // The items have to be those of the format
         let (least, ..) = offsets(header.format).unwrap_or_default();
         let extra = u16::try_from(header.record.saturating_sub(least)).unwrap_or(u16::MAX);
+        if extra > MAX_EXTRA {
+            let what = format!(
+                "a LAZ file with {extra} extra bytes a point, at most {MAX_EXTRA} are decoded; decompress it with `laszip`"
+            );
+            return Err(ParseError::unsupported(what));
+        }
         let expected = LazItemRecordBuilder::default_for_point_format_id(header.format, extra);
         let expected = expected.map_err(|error| bad(error.to_string()))?;
         let has_layers = header.format > 5;
@@ -177,7 +197,9 @@ impl Settings {
         source.extend(body);
         source.extend([0; TABLE]);
         let decoded = catch_panic(|| -> Result<(), DecoderError> {
-            let mut decoder = LasZipDecompressor::new(Cursor::new(&source), self.vlr.clone())?;
+            let source = Cursor::new(&source);
+            let selection = DecompressionSelection::all().skip_gps_time();
+            let mut decoder = LasZipDecompressor::selective(source, self.vlr.clone(), selection)?;
             Ok(decoder.decompress_many(to)?)
         });
         decoded.map_err(|DecoderError(what)| what)
@@ -230,7 +252,7 @@ impl From<std::io::Error> for DecoderError {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::FORMAT;
+    use super::super::{FORMAT, POINT_FORMAT};
     use super::*;
     use crate::read::damage::{TestedReader, mutate, sample};
     use crate::read::{ByteSource, Step};
@@ -241,7 +263,7 @@ mod tests {
         read: |bytes, step| FORMAT.read(bytes, step),
     };
 
-    const FORMATS: [u8; 6] = [0, 1, 3, 6, 7, 8];
+    const FORMATS: [u8; 5] = [0, 2, 6, 7, 8];
 
     fn cloud(format: u8) -> Vec<u8> {
         sample(&format!("las/format{format}.laz"))
@@ -252,11 +274,13 @@ mod tests {
         for format in FORMATS {
             let packed = cloud(format);
             assert_eq!(FORMAT.reader().sniff(&packed), Ok(Confidence::Signature));
-            let plain = READER.one(&sample(&format!("las/format{format}.las")));
+            let mut plain = READER.one(&sample(&format!("las/format{format}.las")));
             assert_eq!(plain.positions.len(), 300);
+            plain.attributes.retain(|attribute| attribute.name != "gps_time");
             assert_eq!(READER.one(&packed), plain, "format {format}");
             let notes = FORMAT.reader().notes(&packed);
             assert!(notes[0].starts_with("LAZ 1."), "{notes:?}");
+            assert_eq!(notes.len() > 1, format > 5, "{notes:?}");
         }
     }
 
@@ -284,20 +308,27 @@ mod tests {
             bytes[place..place + value.len()].copy_from_slice(value);
             READER.error_inside(&bytes).to_string()
         };
-        let (stream, _) = places(&cloud(3));
+        let (stream, _) = places(&cloud(2));
         let (layers, start) = places(&cloud(6));
         let mut others = Vec::new();
         for (format, place, value, message) in [
-            (3, stream, &[9, 0][..], "Compressor type 9 is not valid"),
-            (3, stream, &[3, 0], "the unknown compressor 3"),
-            (3, stream + 12, &[255; 4], "chunks of several lengths"),
-            (3, stream + 32, &[200, 0], "the record of LASzip: "),
-            (3, stream + 34, &[10, 0], "are not those of the format of points 3"),
-            (3, stream + 36, &[19, 0], "are not those of the format of points 3"),
-            (3, stream + 38, &[7, 0], "are not those of the format of points 3"),
-            (3, stream - 52, b"X", "there is no record `laszip encoded`"),
-            (3, 107, &[255, 0, 0, 1], "compressed points in"),
-            (3, 107, &[255, 255, 0, 0], "compressed points are damaged"),
+            (2, stream, &[9, 0][..], "Compressor type 9 is not valid"),
+            (2, stream, &[3, 0], "the unknown compressor 3"),
+            (2, stream + 12, &[255; 4], "chunks of several lengths"),
+            (2, stream + 32, &[200, 0], "the record of LASzip: "),
+            (2, stream + 34, &[10, 0], "are not those of the format of points 2"),
+            (2, stream + 36, &[19, 0], "are not those of the format of points 2"),
+            (2, stream + 38, &[7, 0], "are not those of the format of points 2"),
+            (2, 105, &[0, 255], "65254 extra bytes a point"),
+            (2, stream - 52, b"X", "there is no record `laszip encoded`"),
+            (2, 107, &[255, 0, 0, 1], "compressed points in"),
+            (2, 107, &[255, 255, 0, 0], "compressed points are damaged"),
+            (
+                2,
+                POINT_FORMAT,
+                &[0x83, 34, 0],
+                "format 3, whose times cannot be decoded safely; decompress",
+            ),
             (6, layers, &[2, 0], "the unknown compressor 2"),
             (6, start + 8 + 30, &[0; 4], "a chunk has no points"),
             (6, start + 8 + 30 + 4, &[255; 4], "longer than what is left"),
