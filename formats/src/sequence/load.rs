@@ -160,6 +160,7 @@ impl Sequence {
         let Some(step) = part.step else {
             self.check_listed(part)?;
             let file = FrameFile::open_within(&part.path, budget)?;
+            let file = file.with_mesh_points(self.mesh_points);
             return match file.steps() {
                 [_, second, ..] => {
                     let what = format!(
@@ -182,7 +183,8 @@ impl Sequence {
         }
         // Drop the old one first: two large files need not be in memory at once.
         *lock() = None;
-        let file = Arc::new(FrameFile::open_within(&part.path, budget)?);
+        let file = FrameFile::open_within(&part.path, budget)?;
+        let file = Arc::new(file.with_mesh_points(self.mesh_points));
         *lock() = Some(CachedFile { file: Arc::clone(&file), stamp });
         Ok((file, step))
     }

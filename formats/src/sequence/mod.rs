@@ -97,6 +97,8 @@ pub struct SequenceSettings {
     pub budget: MemoryBudget,
     /// Whether lists of files may name files outside their directory.
     pub follow_links: bool,
+    /// Whether the vertices of meshes are particles; otherwise meshes are refused.
+    pub mesh_points: bool,
 }
 
 /// One time step: its number in the simulation and the files it is made of.
@@ -125,6 +127,7 @@ pub struct Sequence {
     all_parts: Option<AllParts>,
     /// Files that steps lack.
     missing_pieces: MissingPieces,
+    mesh_points: bool,
 }
 
 /// Frames, names and notes of a sequence of all parts.
@@ -185,10 +188,11 @@ impl Sequence {
         // Follow lists of files
         if collection::has_list(group.files.iter().map(|file| &*file.path)) {
             let expansion = collection::expand(&group, settings, &mut notes)?;
-            return Ok(Self::from_expansion(expansion, notes, settings.budget));
+            let sequence = Self::from_expansion(expansion, notes, settings.budget);
+            return Ok(Self { mesh_points: settings.mesh_points, ..sequence });
         }
         let sequence = Self::from_group(group, notes, settings.budget);
-        Ok(Self { missing_pieces, ..sequence })
+        Ok(Self { missing_pieces, mesh_points: settings.mesh_points, ..sequence })
     }
 
     fn from_expansion(expansion: Expansion, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
@@ -206,6 +210,7 @@ impl Sequence {
             reference: ReferenceCell::default(),
             all_parts: None,
             missing_pieces: MissingPieces::default(),
+            mesh_points: false,
         }
     }
 
@@ -246,6 +251,7 @@ impl Sequence {
             reference: ReferenceCell::default(),
             all_parts,
             missing_pieces: MissingPieces::default(),
+            mesh_points: false,
         }
     }
 
@@ -430,7 +436,7 @@ impl Sequence {
     }
 
     /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a
-    /// topology or a placement.
+    /// topology or a placement, or if vertices of meshes are particles.
     pub fn lone_file(&self, index: usize) -> Option<&Path> {
         let frame = self.frames.get(index)?;
         let [part] = frame.parts.as_slice() else {
@@ -438,7 +444,7 @@ impl Sequence {
         };
         let is_whole = self.missing_pieces.check(frame).is_ok();
         let is_alone = self.parts.len() < 2 && part.step.is_none() && is_whole;
-        let is_unchanged = self.topology.is_none() && self.placement.is_none();
+        let is_unchanged = self.topology.is_none() && self.placement.is_none() && !self.mesh_points;
         (is_alone && is_unchanged).then_some(&part.path)
     }
 }

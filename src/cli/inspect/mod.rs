@@ -52,6 +52,9 @@ pub(super) struct InspectArgs {
     /// Read files outside the directory of a list of files, such as a .pvd, that names them.
     #[arg(long)]
     follow_links: bool,
+    /// Read the vertices of meshes (PLY with faces) as particles.
+    #[arg(long)]
+    mesh_points: bool,
     /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
     #[arg(long, value_name = "FILE")]
     topology: Option<PathBuf>,
@@ -175,6 +178,7 @@ impl Request<'_> {
             });
         }
         let file = FrameFile::open_mapped(path, read_budget(None, None))?;
+        let file = file.with_mesh_points(args.mesh_points);
         let count = file.steps().len();
         // For several steps, the metadata come from the first one.
         let mut of_file = notes(path);
@@ -267,8 +271,11 @@ impl InspectedList {
 fn expand(args: &InspectArgs) -> Vec<Meant> {
     let mut all = Vec::new();
     let mut known = HashSet::new();
-    let settings =
-        SequenceSettings { budget: read_budget(None, None), follow_links: args.follow_links };
+    let settings = SequenceSettings {
+        budget: read_budget(None, None),
+        follow_links: args.follow_links,
+        mesh_points: args.mesh_points,
+    };
     for argument in &args.files {
         // A manifest is often given by mistake
         if is_manifest(argument) && argument.is_file() {
@@ -422,9 +429,11 @@ fn read<'a>(
     number: Option<i64>,
     topology: Option<&'a Topology>,
 ) -> Result<Inspected<'a>, FrameError> {
-    // Large files are read in blocks; a topology needs all particles at once
+    // Large files are read in blocks; a topology and meshes need all particles at once
     let in_blocks = match topology {
-        None if file.steps().len() == 1 => Contents::in_blocks(file.path())?,
+        None if file.steps().len() == 1 && !file.has_mesh_points() => {
+            Contents::in_blocks(file.path())?
+        }
         _ => None,
     };
     let contents = match in_blocks {
