@@ -102,6 +102,8 @@ fn ranges_are_parts_of_the_whole() {
         "swift.hdf5",
         "pysph_250.hdf5",
         "points.vtkhdf",
+        "blocks.vtkhdf",
+        "multi.vtkhdf",
         "../hdf5_links/joined.h5",
         "../hdf5_links/selected.h5",
         "../hdf5_links/table.h5",
@@ -268,14 +270,35 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
     assert_eq!(ids_of(one).0, expected[1..]);
     // A file with the values is missing
     let dir = directory_of(&ALL[..2]);
-    let (found, notes) = ids_of(SequenceInput::Directory(dir.path().into()));
+    let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
+    let error = sequence.expect("one frame").load_raw(0).expect_err("half of it").to_string();
+    assert!(error.contains("snap_003.1.hdf5: does not exist; "), "{error}");
+    assert!(error.contains("has 2 files, of which there are 1: copy the others there"), "{error}");
+    // One is read alone by its name
+    let (found, notes) = ids_of(SequenceInput::Files(vec![dir.path().join(ALL[1])]));
     assert_eq!(found[0].len(), 23);
-    assert!(notes.contains("only 1 of them exist"), "{notes}");
+    assert!(notes.contains("of 2 files, but only 1 of them is used"), "{notes}");
     // All are
     let dir = directory_of(&ALL[..1]);
     let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
     let error = sequence.expect("one frame").load_raw(0).expect_err("no values").to_string();
     assert!(error.contains("refers to the file `snap_003.0.hdf5`"), "{error}");
+}
+
+/// Blocks of VTKHDF are parts with the names of the assembly; an image among them is left out.
+#[test]
+fn blocks_of_vtkhdf_are_parts() {
+    for name in ["blocks.vtkhdf", "multi.vtkhdf"] {
+        let path = data(name);
+        let particles = read(FrameFile::open(&path)).expect("a good file").remove(0);
+        let labels: Vec<(i64, &str)> =
+            particles.labels["part"].iter().map(|(part, name)| (*part, name.as_str())).collect();
+        assert_eq!(labels, [(0, "fluid"), (1, "wall")], "{name}");
+        assert!(particles.notes.iter().any(|note| note.contains("`density`")), "{name}");
+        let notes = spherule_formats::open::notes(&path).join("; ");
+        assert!(notes.contains("0 = fluid, 1 = wall"), "{notes}");
+        assert!(notes.contains("left out: grid (ImageData)"), "{notes}");
+    }
 }
 
 /// The only step of a file with unusual names.

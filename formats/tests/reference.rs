@@ -162,7 +162,7 @@ fn collections_are_what_the_reference_readers_give() {
 #[test]
 #[cfg(feature = "hdf5")]
 fn hdf5_is_what_the_reference_readers_give() {
-    assert_eq!(compare("hdf5"), 107);
+    assert_eq!(compare("hdf5"), 115);
 }
 
 #[test]

@@ -132,7 +132,7 @@ def _paths(path):
     return [os.fspath(path) for path in paths]
 
 
-def sequence(path, *, follow_links=False, topology=None):
+def sequence(path, *, follow_links=False, mesh_points=False, topology=None):
     """Finds the frames of files.
 
     Parameters
@@ -141,6 +141,8 @@ def sequence(path, *, follow_links=False, topology=None):
         Files, a directory, or a pattern such as "run1/frame_####.vtk".
     follow_links : bool
         Whether lists of files, such as a .pvd, may name files outside their directory.
+    mesh_points : bool
+        Whether the vertices of meshes (PLY with faces) are particles; otherwise meshes are refused.
     topology : path, optional
         A file with the elements and other properties of the atoms of a trajectory, such as a .gro, .pdb or .psf.
 
@@ -154,10 +156,13 @@ def sequence(path, *, follow_links=False, topology=None):
         There are no frames, or they cannot be listed.
     """
     topology = None if topology is None else os.fspath(topology)
-    return Sequence(_spherule.FrameList(_paths(path), follow_links=follow_links, topology=topology))
+    frames = _spherule.FrameList(
+        _paths(path), follow_links=follow_links, mesh_points=mesh_points, topology=topology
+    )
+    return Sequence(frames)
 
 
-def read(path, frame=None, *, topology=None):
+def read(path, frame=None, *, mesh_points=False, topology=None):
     """Reads one frame.
 
     Parameters
@@ -166,6 +171,8 @@ def read(path, frame=None, *, topology=None):
         As of `sequence`.
     frame : int, optional
         Number of the frame; may be left out if there is only one.
+    mesh_points : bool
+        As of `sequence`.
     topology : path, optional
         As of `sequence`.
 
@@ -178,7 +185,7 @@ def read(path, frame=None, *, topology=None):
     InputError
         It cannot be read, or there are several frames and none was chosen.
     """
-    frames = sequence(path, topology=topology)
+    frames = sequence(path, mesh_points=mesh_points, topology=topology)
     if frame is not None:
         return frames.frame(frame)
     if len(frames) != 1:

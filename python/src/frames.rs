@@ -27,14 +27,16 @@ pub(crate) struct FrameList {
 #[pymethods]
 impl FrameList {
     #[new]
-    #[pyo3(signature = (paths, *, follow_links, topology))]
+    #[pyo3(signature = (paths, *, follow_links, mesh_points, topology))]
     fn new(
         py: Python<'_>,
         paths: Vec<PathBuf>,
         follow_links: bool,
+        mesh_points: bool,
         topology: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let settings = SequenceSettings { budget: read_budget(None, None), follow_links };
+        let settings =
+            SequenceSettings { budget: read_budget(None, None), follow_links, mesh_points };
         let paths = SequenceInput::from_paths(paths);
         let sequence = py.detach(|| {
             let mut sequence = Sequence::open_with(&paths, settings)?;

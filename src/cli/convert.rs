@@ -46,6 +46,9 @@ pub(super) struct ConvertArgs {
     /// Read files outside the directory of a list of files, such as a .pvd, that names them.
     #[arg(long, help_heading = "Input")]
     follow_links: bool,
+    /// Read the vertices of meshes (PLY with faces) as particles.
+    #[arg(long, help_heading = "Input")]
+    mesh_points: bool,
     /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     topology: Option<PathBuf>,
@@ -180,6 +183,7 @@ fn open_sequence(args: &ConvertArgs) -> Result<Sequence, CliError> {
     let settings = SequenceSettings {
         budget: conversion_budget(args.memory.map(limit)),
         follow_links: args.follow_links,
+        mesh_points: args.mesh_points,
     };
     let mut sequence = in_thread(|| Sequence::open_with(&input, settings))?;
     if let Some(path) = &args.topology {

@@ -33,7 +33,7 @@ const LISTS: [&str; 12] = [
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 68] = [
+const FLAGS: [(&str, &str); 69] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -91,6 +91,7 @@ const FLAGS: [(&str, &str); 68] = [
     ("--surface smooth --spray", "surface.spray = true"),
     ("--no-mmap", "input.mmap = false"),
     ("--follow-links", "input.follow_links = true"),
+    ("--mesh-points", "input.mesh_points = true"),
     ("--where x>2", "select.where = \"x>2\""),
     ("--topology a.gro", "input.topology = \"a.gro\""),
     ("--parts a,b", "input.parts = [\"a\", \"b\"]"),

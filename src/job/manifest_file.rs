@@ -57,6 +57,7 @@ impl JobManifest {
         let settings = SequenceSettings {
             budget: reading_budget(&self.manifest),
             follow_links: input.follow_links,
+            mesh_points: input.mesh_points,
         };
         let paths = SequenceInput::from_paths(paths);
         let mut sequence = in_thread(|| Sequence::open_with(&paths, settings))?;

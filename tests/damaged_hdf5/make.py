@@ -101,6 +101,26 @@ with made("no-step.vtkhdf", "has no offset for step 1") as file:
     group["NumberOfPoints"], group["Points"] = [2, 2], POINTS
     group.create_group("Steps").attrs["NSteps"] = 2
     group["Steps/Values"], group["Steps/PointOffsets"], group["Steps/PartOffsets"] = [0.0, 1.0], [0, 2], [0]
+with made("images.vtkhdf", "MultiBlockDataSet: a (ImageData)`, which is not read") as file:
+    group = file.create_group("VTKHDF")
+    group.attrs["Type"] = numpy.bytes_("MultiBlockDataSet")
+    group.create_group("a").attrs["Type"] = numpy.bytes_("ImageData")
+with made("no-blocks.vtkhdf", "PartitionedDataSetCollection: without blocks") as file:
+    file.create_group("VTKHDF").attrs["Type"] = numpy.bytes_("PartitionedDataSetCollection")
+    file.create_group("VTKHDF/Assembly")
+with made("block.vtkhdf", "/VTKHDF/a has no data set Points with three numbers") as file:
+    group = file.create_group("VTKHDF")
+    group.attrs["Type"] = numpy.bytes_("PartitionedDataSetCollection")
+    group.create_group("a").attrs["Type"] = numpy.bytes_("PolyData")
+    group["a/NumberOfPoints"] = [4]
+with made("block-steps.vtkhdf", "/VTKHDF/a has 2 time steps, /VTKHDF/b has 3") as file:
+    group = file.create_group("VTKHDF")
+    group.attrs["Type"] = numpy.bytes_("PartitionedDataSetCollection")
+    for name, steps in [("a", 2), ("b", 3)]:
+        block = group.create_group(name)
+        block.attrs["Type"] = numpy.bytes_("PolyData")
+        block["NumberOfPoints"], block["Points"] = [4], POINTS
+        block.create_group("Steps").attrs["NSteps"] = steps
 with made("points.vtkhdf", "rows 0 to 9 of 4") as file:
     group = file.create_group("VTKHDF")
     group.attrs["Type"] = numpy.bytes_("PolyData")

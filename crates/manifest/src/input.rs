@@ -106,6 +106,10 @@ section! {
         ///
         /// Without it, a list may only name files in its own directory and in those below.
         follow_links: bool = false, affects(Affects::Nothing), flag("follow-links", "", "Input");
+        /// Read the vertices of meshes (PLY with faces) as particles
+        ///
+        /// Without it, a mesh is refused, since its vertices are a surface. --mesh draws the surface.
+        mesh_points: bool = false, flag("mesh-points", "", "Input");
         /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
         ///
         /// Elements and other attributes that do not change are added to all frames. Atoms are joined by `id` if both

@@ -69,8 +69,6 @@ const TPR: &str = "a GROMACS run input file (.tpr), which is not read; write .gr
 const UTF16: &str = "UTF-16 text, which is not read; save as UTF-8";
 const LAMMPS_BINARY: &str = "a LAMMPS binary dump without names of columns, which is not read; run `binary2txt` on it, or dump to a text file";
 const XDMF: &str = "an XDMF index, which keeps its data in other files; save as .vtu with ParaView";
-const HOUDINI_JSON: &str =
-    "Houdini geometry in text (.geo), which is not read; save as .bgeo or .bgeo.sc";
 
 /// Refuses what is known by its first bytes (magics of `shortest` bytes and more), or failing
 /// that by its name.
@@ -83,7 +81,6 @@ pub(super) fn refuse(head: &[u8], path: &Path, shortest: usize) -> Result<(), Pa
         .or_else(|| is_lammps_binary(head, path).then_some(LAMMPS_BINARY))
         .or_else(|| is_dualsphysics(head, path).then_some(DUALSPHYSICS))
         .or_else(|| path.extension().is_some_and(|end| end == "bp").then_some(ADIOS))
-        .or_else(|| is_houdini_json(head).then_some(HOUDINI_JSON))
         .or_else(|| is_xdmf(head).then_some(XDMF));
     what.map_or(Ok(()), |what| Err(ParseError::unsupported(what)))
 }
@@ -118,13 +115,6 @@ fn is_lammps_binary(head: &[u8], path: &Path) -> bool {
         .split_at_checked(8)
         .is_some_and(|(length, name)| length[7] == 0xff && name.starts_with(b"DUMP"));
     named || opens
-}
-
-fn is_houdini_json(head: &[u8]) -> bool {
-    let head = String::from_utf8_lossy(&head[..head.len().min(64)]);
-    head.trim_start()
-        .strip_prefix('[')
-        .is_some_and(|rest| rest.trim_start().starts_with("\"fileversion\""))
 }
 
 fn is_xdmf(head: &[u8]) -> bool {

@@ -18,13 +18,14 @@ pub(super) struct SteppedFile {
     head: Vec<u8>,
     /// The file when it was opened.
     stamp: FileStamp,
+    has_mesh_points: bool,
 }
 
 impl SteppedFile {
     /// The file that had `stamp` and begins with `head`.
     pub(super) fn new(head: &[u8], stamp: FileStamp) -> Self {
         let head = head[..head.len().min(HEAD_LEN)].to_vec();
-        Self { head, stamp }
+        Self { head, stamp, has_mesh_points: false }
     }
 
     /// Whether the file has several steps. A file with one step is read as a whole: its pages would count as memory
@@ -37,6 +38,11 @@ impl SteppedFile {
     ) -> bool {
         let steps = self.steps(path, format, budget);
         steps.map_or(true, |steps| steps.len() > 1)
+    }
+
+    /// Says whether the vertices of a mesh are particles.
+    pub(super) const fn set_mesh_points(&mut self, are_particles: bool) {
+        self.has_mesh_points = are_particles;
     }
 
     pub(super) fn head(&self) -> &[u8] {
@@ -66,7 +72,10 @@ impl SteppedFile {
         step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, FrameError> {
-        self.with_map(path, |source| format.read_within(source, step, budget))
+        self.with_map(path, |source| {
+            source.set_mesh_points(self.has_mesh_points);
+            format.read_within(source, step, budget)
+        })
     }
 
     /// Maps the file while `read` runs.

@@ -48,6 +48,7 @@ pub struct FrameFile {
     stored_len: u64,
     notes: Vec<String>,
     budget: MemoryBudget,
+    has_mesh_points: bool,
     /// The files that it refers to, if it was read as a whole.
     siblings: SiblingFiles,
 }
@@ -260,7 +261,25 @@ impl FrameFile {
             stored_len,
             notes,
             budget,
+            has_mesh_points: false,
         })
+    }
+
+    /// The same file, of which the vertices of a mesh are particles if `are_particles`; otherwise a mesh is refused.
+    #[must_use]
+    pub fn with_mesh_points(mut self, are_particles: bool) -> Self {
+        self.has_mesh_points = are_particles;
+        match &mut self.content {
+            Content::Stepped(file) => file.set_mesh_points(are_particles),
+            Content::Streamed(file) => file.set_mesh_points(are_particles),
+            Content::Whole(_) | Content::Aligned(_) => {}
+        }
+        self
+    }
+
+    /// Whether the vertices of a mesh are particles.
+    pub const fn has_mesh_points(&self) -> bool {
+        self.has_mesh_points
     }
 
     /// Path of the file.
@@ -347,6 +366,7 @@ impl FrameFile {
             Content::Stepped(file) => file.read(&self.path, self.format, step, left)?,
             Content::Whole(bytes) => {
                 let mut source = ByteSource::shared(bytes);
+                source.set_mesh_points(self.has_mesh_points);
                 let particles = self.format.read_within(&mut source, step, left);
                 self.siblings.check()?;
                 particles.map_err(in_file)?

@@ -23,6 +23,7 @@ pub(super) struct StreamedFile {
     /// The stream at the end of the step that was read last: the next step often begins there, and a compressed
     /// file can only be read from its beginning.
     parked: Mutex<Option<ByteSource<'static>>>,
+    has_mesh_points: bool,
 }
 
 /// What only the end of a stream shows.
@@ -43,7 +44,13 @@ impl StreamedFile {
             stamp,
             end: OnceLock::new(),
             parked: Mutex::new(None),
+            has_mesh_points: false,
         }
+    }
+
+    /// Says whether the vertices of a mesh are particles.
+    pub(super) const fn set_mesh_points(&mut self, are_particles: bool) {
+        self.has_mesh_points = are_particles;
     }
 
     pub(super) fn head(&self) -> &[u8] {
@@ -103,6 +110,7 @@ impl StreamedFile {
             Some(source) => source,
             None => self.source(path, budget)?,
         };
+        source.set_mesh_points(self.has_mesh_points);
         let particles = format.read_within(&mut source, step, budget);
         // Only the end of a compressed file shows whether all of it is sound.
         if self.is_compressed() && self.end.get().is_none() && particles.is_ok() {

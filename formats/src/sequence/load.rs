@@ -107,6 +107,7 @@ impl Sequence {
     /// Reads frame `index` as it is in the files.
     pub(super) fn read_parts(&self, index: usize) -> Result<Loaded, FrameError> {
         let frame = &self.frames[index];
+        self.missing_pieces.check(frame)?;
         let mut notes = Vec::new();
         let (mut all_bytes, mut content_bytes) = (0, 0);
         // Read the parts one after the other
@@ -181,6 +182,7 @@ impl Sequence {
         let Some(step) = part.step else {
             self.check_listed(part)?;
             let file = FrameFile::open_within(&part.path, budget)?;
+            let file = file.with_mesh_points(self.mesh_points);
             return match file.steps() {
                 [_, second, ..] => {
                     let what = format!(
@@ -203,7 +205,8 @@ impl Sequence {
         }
         // Drop the old one first: two large files need not be in memory at once.
         *lock() = None;
-        let file = Arc::new(FrameFile::open_within(&part.path, budget)?);
+        let file = FrameFile::open_within(&part.path, budget)?;
+        let file = Arc::new(file.with_mesh_points(self.mesh_points));
         *lock() = Some(CachedFile { file: Arc::clone(&file), stamp });
         Ok((file, step))
     }

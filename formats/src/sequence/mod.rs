@@ -53,6 +53,7 @@ use load::{CachedFile, stamp};
 use name::FileName;
 use notes::{note_gaps, note_missing_parts};
 use pattern::Pattern;
+use pieces::MissingPieces;
 use placement::ReferenceCell;
 
 /// Whether the file at `path` has no particles itself, but stands for others: it is a list of files, or a snapshot of
@@ -97,6 +98,8 @@ pub struct SequenceSettings {
     pub budget: MemoryBudget,
     /// Whether lists of files may name files outside their directory.
     pub follow_links: bool,
+    /// Whether the vertices of meshes are particles; otherwise meshes are refused.
+    pub mesh_points: bool,
 }
 
 /// One time step: its number in the simulation and the files it is made of.
@@ -125,6 +128,9 @@ pub struct Sequence {
     every: u32,
     /// What there is with all parts, if some are left out unless they are named.
     all_parts: Option<AllParts>,
+    /// Files that steps lack.
+    missing_pieces: MissingPieces,
+    mesh_points: bool,
 }
 
 /// Frames, names and notes of a sequence of all parts.
@@ -164,27 +170,32 @@ impl Sequence {
     ) -> Result<Self, SequenceError> {
         let mut notes = Vec::new();
         // Find the files, and which of them belong together
-        let group = match input {
+        let (group, missing_pieces) = match input {
             SequenceInput::Directory(path) => {
-                let names = pieces::find_pieces(scan::directory(path)?, &mut notes);
-                group::pick(path, names, &mut notes)?
+                let (names, missing) =
+                    pieces::find_pieces(input, scan::directory(path)?, &mut notes);
+                (group::pick(path, names, &mut notes)?, missing)
             }
             SequenceInput::Pattern(path) => {
                 let pattern = Pattern::parse(path)?;
-                let names = pieces::find_pieces(scan::fitting(&pattern, path)?, &mut notes);
-                group::pick(&pattern.directory, names, &mut notes)?
+                let names = scan::fitting(&pattern, path)?;
+                let (names, missing) = pieces::find_pieces(input, names, &mut notes);
+                (group::pick(&pattern.directory, names, &mut notes)?, missing)
             }
             SequenceInput::Files(paths) => {
-                let names = pieces::find_pieces(listed_names(paths)?, &mut notes);
-                group::listed(names, &mut notes)?
+                let names = listed_names(paths)?;
+                let (names, missing) = pieces::find_pieces(input, names, &mut notes);
+                (group::listed(names, &mut notes)?, missing)
             }
         };
         // Follow lists of files
         if collection::has_list(group.files.iter().map(|file| &*file.path)) {
             let expansion = collection::expand(&group, settings, &mut notes)?;
-            return Ok(Self::from_expansion(expansion, notes, settings.budget));
+            let sequence = Self::from_expansion(expansion, notes, settings.budget);
+            return Ok(Self { mesh_points: settings.mesh_points, ..sequence });
         }
-        Ok(Self::from_group(group, notes, settings.budget))
+        let sequence = Self::from_group(group, notes, settings.budget);
+        Ok(Self { missing_pieces, mesh_points: settings.mesh_points, ..sequence })
     }
 
     fn from_expansion(expansion: Expansion, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
@@ -202,6 +213,8 @@ impl Sequence {
             reference: ReferenceCell::default(),
             every: 1,
             all_parts: None,
+            missing_pieces: MissingPieces::default(),
+            mesh_points: false,
         }
     }
 
@@ -242,6 +255,8 @@ impl Sequence {
             reference: ReferenceCell::default(),
             every: 1,
             all_parts,
+            missing_pieces: MissingPieces::default(),
+            mesh_points: false,
         }
     }
 
@@ -432,13 +447,15 @@ impl Sequence {
     }
 
     /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a
-    /// topology or a placement.
+    /// topology or a placement, or if vertices of meshes are particles.
     pub fn lone_file(&self, index: usize) -> Option<&Path> {
-        let [part] = self.frames.get(index)?.parts.as_slice() else {
+        let frame = self.frames.get(index)?;
+        let [part] = frame.parts.as_slice() else {
             return None;
         };
-        let is_alone = self.parts.len() < 2 && part.step.is_none();
-        let is_unchanged = self.topology.is_none() && self.placement.is_none();
+        let is_whole = self.missing_pieces.check(frame).is_ok();
+        let is_alone = self.parts.len() < 2 && part.step.is_none() && is_whole;
+        let is_unchanged = self.topology.is_none() && self.placement.is_none() && !self.mesh_points;
         (is_alone && is_unchanged).then_some(&part.path)
     }
 }

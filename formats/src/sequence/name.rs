@@ -110,9 +110,19 @@ impl FileName {
         Some(piece)
     }
 
-    /// Whether files with such a name may belong to one step.
+    /// The path of the file `number` among those of one step, of which this is one.
+    pub(super) fn sibling_piece(&self, number: u64) -> Option<PathBuf> {
+        self.piece?;
+        let name = self.path.file_name()?.to_str()?;
+        let (stem, digits) = name.strip_suffix(&self.suffix)?.rsplit_once('.')?;
+        // Numbers have a fixed width if one begins with 0
+        let width = if digits.starts_with('0') { digits.len() } else { 1 };
+        Some(self.path.with_file_name(format!("{stem}.{number:0width$}{}", self.suffix)))
+    }
+
+    /// Whether files with such a name may belong to one step. Binary snapshots have no extension.
     fn is_snapshot(&self) -> bool {
-        ["hdf5", "h5"].contains(&self.extension.as_str())
+        ["hdf5", "h5", ""].contains(&self.extension.as_str())
     }
 
     /// The number of a file that has no siblings: what follows the word `frame`, else the last.

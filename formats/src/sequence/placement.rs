@@ -204,7 +204,6 @@ mod tests {
 
     use super::super::{SequenceInput, SequenceSettings};
     use super::*;
-    use crate::MemoryBudget;
 
     /// The particles with these indices.
     #[derive(Debug)]
@@ -231,7 +230,7 @@ mod tests {
             places = places.map(|[x, y, z]| [10.0 - y, x, z - 4.0]);
         }
         let input = SequenceInput::Directory(dir.path().to_owned());
-        let settings = SequenceSettings { budget: MemoryBudget::UNLIMITED, follow_links: false };
+        let settings = SequenceSettings::default();
         let mut sequence = Sequence::open_with(&input, settings).unwrap();
         sequence.set_placement(placement);
         (dir, sequence)

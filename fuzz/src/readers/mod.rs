@@ -81,6 +81,8 @@ const XZ_RATIO: u64 = 16_384;
 const DEFLATE_RATIO: u64 = 1032;
 /// An atom of an `.xtc` file has two bits at least.
 const XTC_RATIO: u64 = 8;
+/// At most 1024 points for a byte, of up to 64 bytes in practice.
+const LAZ_RATIO: u64 = 65_536;
 /// Headers that stand for values without bytes in the file (a radius common to all).
 const SLACK: u64 = 4096;
 
@@ -110,9 +112,10 @@ pub fn ply(bytes: &[u8]) -> usize {
     read_all(read::ply::FORMAT, bytes, 1)
 }
 
-/// LAS.
+/// LAS and LAZ.
 pub fn las(bytes: &[u8]) -> usize {
-    read_all(read::las::FORMAT, bytes, 1)
+    let is_compressed = bytes.get(104).is_some_and(|format| format & 0x80 != 0);
+    read_all(read::las::FORMAT, bytes, if is_compressed { LAZ_RATIO } else { 1 })
 }
 
 /// Point clouds of laser scanners in text.

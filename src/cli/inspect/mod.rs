@@ -1,6 +1,7 @@
 //! `spherule inspect`: the content of particle files as text or JSON.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -28,7 +29,7 @@ mod show;
 mod steps;
 
 use native::NativeFacts;
-use steps::StepLines;
+use steps::{ALL, StepLines, steps_to_read};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -51,6 +52,9 @@ pub(super) struct InspectArgs {
     /// Read files outside the directory of a list of files, such as a .pvd, that names them.
     #[arg(long)]
     follow_links: bool,
+    /// Read the vertices of meshes (PLY with faces) as particles.
+    #[arg(long)]
+    mesh_points: bool,
     /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
     #[arg(long, value_name = "FILE")]
     topology: Option<PathBuf>,
@@ -75,6 +79,10 @@ struct Inspected<'a> {
     cell: Option<SimulationCell>,
     /// Texts behind the numbers of attributes.
     labels: Labels,
+    /// Bonds between particles that the files list.
+    bond_count: usize,
+    /// The file of the topology.
+    topology: Option<&'a Path>,
     /// Metadata of the file that is not per particle.
     notes: Vec<String>,
     /// Whether a full verification was requested and done.
@@ -90,32 +98,119 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
         .map(|path| Topology::open(path, read_budget(None, None)))
         .transpose()
         .map_err(SequenceError::Topology)?;
+    let request = Request { args, topology: topology.as_ref() };
     for meant in expand(args) {
-        let inspected = match meant {
-            Meant::List(list) => Ok(list.print(args.json)),
-            Meant::File(file, place) => inspect(&file, place, args, topology.as_ref())
-                .map_err(|e| (file, frame_message(&e))),
-            Meant::Nothing(argument, why) => Err((argument, why)),
+        let printed = match &meant {
+            Meant::Series(files) => request.print_series(files, &mut outcome)?,
+            one => request.print(one, None, &mut outcome)?,
         };
-        // Print the errors of files among the results, so that every file has one
-        let printed = match inspected {
-            Ok(printed) => printed,
-            Err((file, error)) => {
-                outcome = Outcome::SomeFailed;
-                if args.json {
-                    let shown = file.display().to_string();
-                    print::json(&json!({"file": shown, "error": error}))
-                } else {
-                    error!("{error}");
-                    Ok(Reader::Listening)
-                }
-            }
-        };
-        if printed? == Reader::Gone {
+        if printed == Reader::Gone {
             return Ok(outcome);
         }
     }
     Ok(outcome)
+}
+
+/// What is printed of each file.
+struct Request<'a> {
+    args: &'a InspectArgs,
+    /// Gives its properties to all particles.
+    topology: Option<&'a Topology>,
+}
+
+impl Request<'_> {
+    /// Prints what is in `files` of a sequence: the first, the last, and what differs.
+    fn print_series(&self, files: &[Meant], outcome: &mut Outcome) -> Result<Reader, CliError> {
+        let bytes = files.iter().map(Meant::stored_len).fold(0, u64::saturating_add);
+        let mut lines = StepLines::new("file", files.len());
+        for index in steps_to_read(files.len(), bytes) {
+            let printed = match files.get(index) {
+                Some(file) => self.print(file, Some((&mut lines, index)), outcome)?,
+                None => Reader::Listening,
+            };
+            if printed == Reader::Gone {
+                return Ok(Reader::Gone);
+            }
+        }
+        lines.finish()
+    }
+
+    /// Prints what is in a file, which may be one of a series.
+    fn print(
+        &self,
+        meant: &Meant,
+        series: Option<(&mut StepLines, usize)>,
+        outcome: &mut Outcome,
+    ) -> Result<Reader, CliError> {
+        let (file, error) = match meant {
+            Meant::List(list) => return list.print(self.args.json),
+            Meant::Series(files) => return self.print_series(files, outcome),
+            Meant::Nothing(argument, why) => (argument, why.clone()),
+            Meant::File(file, place) => match self.inspect(file, *place, series) {
+                Ok(printed) => return printed,
+                Err(error) => (file, frame_message(&error)),
+            },
+        };
+        // Print the errors of files among the results, so that every file has one
+        *outcome = Outcome::SomeFailed;
+        if self.args.json {
+            return print::json(&json!({"file": file.display().to_string(), "error": error}));
+        }
+        error!("{error}");
+        Ok(Reader::Listening)
+    }
+
+    /// Inspects one file. The outer error is of the file, the inner one of the output.
+    fn inspect(
+        &self,
+        path: &Path,
+        place: FramePlace,
+        series: Option<(&mut StepLines, usize)>,
+    ) -> Result<Result<Reader, CliError>, FrameError> {
+        let Request { args, topology } = *self;
+        // The index of a native frame has most of what is printed
+        if topology.is_none() && is_native(path)? {
+            let mut inspected = native::inspect(path, place.number, args.verify)?;
+            inspected.time = place.time.or(inspected.time);
+            return Ok(match series {
+                Some((lines, index)) => lines.print(index, &inspected),
+                None => inspected.print(args.json),
+            });
+        }
+        let file = FrameFile::open_mapped(path, read_budget(None, None))?;
+        let file = file.with_mesh_points(args.mesh_points);
+        let count = file.steps().len();
+        // For several steps, the metadata come from the first one.
+        let mut of_file = notes(path);
+        let mut lines = StepLines::new("step", count);
+        let (lines, in_series) = match series {
+            Some((lines, index)) => (lines, Some(index)),
+            None => (&mut lines, None),
+        };
+        let reads_all = args.json || args.verify;
+        let bytes = if reads_all { 0 } else { file.unpacked_len() };
+        for index in steps_to_read(count, bytes) {
+            let mut inspected = read(&file, index, place.number, topology)?;
+            inspected.time = place.time.or(inspected.time);
+            inspected.notes.retain(|note| !of_file.contains(note));
+            inspected.notes.splice(..0, of_file.drain(..));
+            if args.verify && inspected.native.is_some() {
+                verify(file.bytes()).map_err(|e| e.in_file(path))?;
+            }
+            inspected.verified = args.verify;
+            let printed = if args.json {
+                inspected.print(true)
+            } else {
+                lines.print(in_series.unwrap_or(index), &inspected)
+            };
+            match printed {
+                Ok(Reader::Listening) => {}
+                ended => return Ok(ended),
+            }
+        }
+        let ends = in_series.is_none() && !args.json;
+        Ok(if ends { lines.finish() } else { Ok(Reader::Listening) })
+    }
 }
 
 /// The file that an argument refers to.
@@ -124,8 +219,20 @@ enum Meant {
     List(InspectedList),
     /// A file, with its frame.
     File(PathBuf, FramePlace),
+    /// The files of a part of a long sequence.
+    Series(Vec<Self>),
     /// An error.
     Nothing(PathBuf, String),
+}
+
+impl Meant {
+    /// Bytes on the disk.
+    fn stored_len(&self) -> u64 {
+        match self {
+            Self::File(path, _) => fs::metadata(path).map_or(0, |meta| meta.len()),
+            Self::Series(_) | Self::List(_) | Self::Nothing(..) => 0,
+        }
+    }
 }
 
 /// The frame of a file, as far as it is known without reading the file.
@@ -164,8 +271,11 @@ impl InspectedList {
 fn expand(args: &InspectArgs) -> Vec<Meant> {
     let mut all = Vec::new();
     let mut known = HashSet::new();
-    let settings =
-        SequenceSettings { budget: read_budget(None, None), follow_links: args.follow_links };
+    let settings = SequenceSettings {
+        budget: read_budget(None, None),
+        follow_links: args.follow_links,
+        mesh_points: args.mesh_points,
+    };
     for argument in &args.files {
         // A manifest is often given by mistake
         if is_manifest(argument) && argument.is_file() {
@@ -187,25 +297,34 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
             }
             input => match Sequence::open_with(&input, settings) {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
-                Ok(sequence) => add_sequence(argument, &sequence, &mut known, &mut all),
+                Ok(sequence) => {
+                    let is_long = !args.json && !args.verify && is_long(&sequence);
+                    add_list(argument, &sequence, &mut all);
+                    let files = sequence_files(&sequence, &mut known);
+                    if is_long {
+                        all.extend(by_part(files));
+                    } else {
+                        all.extend(files.into_iter().map(|(_, file)| file));
+                    }
+                }
             },
         }
     }
     all
 }
 
-/// Adds the files of `sequence`, which `argument` stands for, that are not `known` yet.
-fn add_sequence(
-    argument: &Path,
-    sequence: &Sequence,
-    known: &mut HashSet<PathBuf>,
-    all: &mut Vec<Meant>,
-) {
+/// Adds the list that `argument` is, or prints the parts of the files that it stands for.
+fn add_list(argument: &Path, sequence: &Sequence, all: &mut Vec<Meant>) {
     if let Some(list) = InspectedList::of(argument, sequence) {
         all.push(Meant::List(list));
     } else if let Some(parts) = parts_text(sequence) {
         message!("{}: {parts}", argument.display());
     }
+}
+
+/// The files of `sequence` that are not `known` yet, with the numbers of their parts.
+fn sequence_files(sequence: &Sequence, known: &mut HashSet<PathBuf>) -> Vec<(u32, Meant)> {
+    let mut files = Vec::new();
     for (index, frame) in sequence.frames().iter().enumerate() {
         let place = FramePlace { number: Some(frame.number), time: sequence.listed_time(index) };
         // A file with many steps is in many frames.
@@ -214,48 +333,34 @@ fn add_sequence(
                 continue;
             }
             let path = part.path.clone();
-            all.push(match sequence.check_listed(part) {
+            let file = match sequence.check_listed(part) {
                 Ok(()) => Meant::File(path, place),
                 Err(error) => Meant::Nothing(path, error.to_string()),
-            });
+            };
+            files.push((part.part, file));
         }
     }
+    files
 }
 
-/// Inspects one file, whose particles get the properties of `topology`. The outer error is of the file, the inner one of
-/// the output.
-fn inspect(
-    path: &Path,
-    place: FramePlace,
-    args: &InspectArgs,
-    topology: Option<&Topology>,
-) -> Result<Result<Reader, CliError>, FrameError> {
-    // The index of a native frame has most of what is printed
-    if topology.is_none() && is_native(path)? {
-        let mut inspected = native::inspect(path, place.number, args.verify)?;
-        inspected.time = place.time.or(inspected.time);
-        return Ok(inspected.print(args.json));
+/// Whether a part of `sequence` has many files, each of one step.
+fn is_long(sequence: &Sequence) -> bool {
+    let frames = sequence.frames();
+    let has_one_each = frames.iter().all(|frame| {
+        let parts = frame.parts.as_slice();
+        parts.iter().all(|part| part.step.is_none())
+            && parts.windows(2).all(|pair| pair[0].part != pair[1].part)
+    });
+    frames.len() > ALL && has_one_each
+}
+
+/// The files of each part as a series.
+fn by_part(files: Vec<(u32, Meant)>) -> impl Iterator<Item = Meant> {
+    let mut parts = BTreeMap::<u32, Vec<Meant>>::new();
+    for (part, file) in files {
+        parts.entry(part).or_default().push(file);
     }
-    let file = FrameFile::open_mapped(path, read_budget(None, None))?;
-    // For several steps, the metadata come from the first one.
-    let mut of_file = notes(path);
-    let mut lines = StepLines::new(file.steps().len());
-    for index in 0..file.steps().len() {
-        let mut inspected = read(&file, index, place.number, topology)?;
-        inspected.time = place.time.or(inspected.time);
-        inspected.notes.retain(|note| !of_file.contains(note));
-        inspected.notes.splice(..0, of_file.drain(..));
-        if args.verify && inspected.native.is_some() {
-            verify(file.bytes()).map_err(|e| e.in_file(path))?;
-        }
-        inspected.verified = args.verify;
-        let printed = if args.json { inspected.print(true) } else { lines.print(&inspected) };
-        match printed {
-            Ok(Reader::Listening) => {}
-            ended => return Ok(ended),
-        }
-    }
-    Ok(Ok(Reader::Listening))
+    parts.into_values().map(Meant::Series)
 }
 
 /// What is in a step of a file.
@@ -266,6 +371,7 @@ struct Contents {
     encoding: &'static str,
     notes: Vec<String>,
     labels: Labels,
+    bond_count: usize,
 }
 
 impl Contents {
@@ -281,6 +387,8 @@ impl Contents {
             cell: source.cell(),
             notes: source.notes().to_vec(),
             labels: source.labels(),
+            // Formats with bonds are not read in blocks
+            bond_count: 0,
             encoding: match source.position_len() {
                 Some(12) => "f32",
                 _ => "f64",
@@ -303,6 +411,7 @@ impl Contents {
             stats: FrameStats::of(&raw),
             notes: raw.notes,
             labels: raw.labels,
+            bond_count: raw.bonds.len(),
             time: raw.time,
             cell: raw.cell,
             encoding: match raw.positions {
@@ -318,11 +427,13 @@ fn read<'a>(
     file: &'a FrameFile,
     index: usize,
     number: Option<i64>,
-    topology: Option<&Topology>,
+    topology: Option<&'a Topology>,
 ) -> Result<Inspected<'a>, FrameError> {
-    // Large files are read in blocks; a topology needs all particles at once
+    // Large files are read in blocks; a topology and meshes need all particles at once
     let in_blocks = match topology {
-        None if file.steps().len() == 1 => Contents::in_blocks(file.path())?,
+        None if file.steps().len() == 1 && !file.has_mesh_points() => {
+            Contents::in_blocks(file.path())?
+        }
         _ => None,
     };
     let contents = match in_blocks {
@@ -360,6 +471,8 @@ fn read<'a>(
         native: native.map(|index| NativeFacts::new(index, file.bytes().len() as u64, None)),
         cell: contents.cell,
         labels: contents.labels,
+        bond_count: contents.bond_count,
+        topology: topology.map(Topology::path),
         notes: contents.notes,
         verified: false,
     })

@@ -53,6 +53,8 @@ pub(super) fn inspect(
         cell: index.details.cell,
         native: Some(NativeFacts::new(index, bytes, sample)),
         labels: Labels::new(),
+        bond_count: 0,
+        topology: None,
         notes: Vec::new(),
         verified: verify,
     })

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use spherule_files::{counted, one_line};
 use spherule_formats::SimulationCell;
 use spherule_formats::stats::{AttributeStats, Number};
+use spherule_frame::join::PART;
 
 use super::{Inspected, InspectedList};
 use crate::cli::CliError;
@@ -64,6 +65,9 @@ impl Inspected<'_> {
                 "vectors": cell.vectors.map(|vector| vector.to_array()),
                 "periodic": cell.periodic,
             })),
+            "parts": self.parts_json(),
+            "bonds": self.bond_count,
+            "topology": self.topology.map(|path| path.display().to_string()),
             "notes": self.notes,
             "encoding": self.encoding,
             "error_bound": self.native.as_ref().map_or(0.0, |native| native.index.max_error),
@@ -104,6 +108,10 @@ impl Inspected<'_> {
         });
         let attributes = stats.attributes.iter();
         lines.extend(attributes.map(|a| attribute_line(a, self.labels.get(&a.name))));
+        if self.bond_count > 0 {
+            lines.push(format!("  {} (--bonds file draws them)", counted(self.bond_count, "bond")));
+        }
+        lines.extend(self.topology.map(|path| format!("  topology {}", path.display())));
         // End with what limits or confirms the rest
         if let Some(sample) = self.native.as_ref().and_then(|native| native.sample) {
             lines.push(format!("  values of attributes are from a sample of {sample} particles"));
@@ -129,6 +137,12 @@ impl Inspected<'_> {
             line += &format!("  time {time}");
         }
         line
+    }
+
+    /// Numbers and names of the values of the attribute `part`; null without.
+    fn parts_json(&self) -> Option<Vec<Value>> {
+        let named = self.labels.get(PART)?.iter();
+        Some(named.map(|(number, name)| json!({"number": number, "name": name})).collect())
     }
 
     /// One value per component.

@@ -423,6 +423,46 @@ def vtkhdf():
                    {"positions": root["Points"][rows], "pressure": root["PointData/pressure"][rows]})
 
 
+# Blocks, as VTK writes them: one lacks an array, one is an image and is left out
+def vtkhdf_blocks():
+    image = vtk.vtkImageData()
+    image.SetDimensions(2, 2, 2)
+    fluid, wall = vtk_points(9), vtk_points(5)
+    wall.GetPointData().RemoveArray("density")
+    blocks = [("fluid", fluid), ("grid", image), ("wall", wall)]
+    collection = vtk.vtkPartitionedDataSetCollection()
+    assembly = vtk.vtkDataAssembly()
+    multi = vtk.vtkMultiBlockDataSet()
+    for index, (name, block) in enumerate(blocks):
+        collection.SetPartition(index, 0, block)
+        collection.GetMetaData(index).Set(vtk.vtkCompositeDataSet.NAME(), name)
+        assembly.AddDataSetIndex(assembly.AddNode(name), index)
+        multi.SetBlock(index, block)
+        multi.GetMetaData(index).Set(vtk.vtkCompositeDataSet.NAME(), name)
+    collection.SetDataAssembly(assembly)
+    for file, data in [("blocks.vtkhdf", collection), ("multi.vtkhdf", multi)]:
+        writer = vtk.vtkHDFWriter()
+        writer.SetInputData(data)
+        writer.SetChunkSize(16)
+        writer.SetFileName(str(HERE / file))
+        writer.Write()
+        reader = vtk.vtkHDFReader()
+        reader.SetFileName(str(HERE / file))
+        reader.Update()
+        found = []
+        leaves = reader.GetOutput().NewIterator()
+        while not leaves.IsDoneWithTraversal():
+            leaf = leaves.GetCurrentDataObject()
+            if isinstance(leaf, vtk.vtkPointSet):
+                values = leaf.GetPointData()
+                found.append({values.GetArrayName(i): vtk_to_numpy(values.GetArray(i))
+                              for i in range(values.GetNumberOfArrays())})
+                found[-1]["positions"] = vtk_to_numpy(leaf.GetPoints().GetData())
+            leaves.GoToNextItem()
+        assert [len(arrays["positions"]) for arrays in found] == [9, 5]
+        expect(file, 0, None, None, joined(list(enumerate(found)), ["density"]))
+
+
 # No known layout: names alone, whatever the storage
 def plain():
     count = 50
@@ -505,4 +545,5 @@ vtkhdf()
 plain()
 cells()
 mass_table()
+vtkhdf_blocks()
 (HERE / "expected.tsv").write_text("".join(lines))

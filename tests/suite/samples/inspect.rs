@@ -5,8 +5,9 @@ use serde_json::Value;
 use super::data_files;
 use crate::harness::{Workshop, sample};
 
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 18] = [
     "attributes",
+    "bonds",
     "bounds",
     "bytes_per_particle",
     "cell",
@@ -19,8 +20,10 @@ const KEYS: [&str; 15] = [
     "frame",
     "mean",
     "notes",
+    "parts",
     "radius",
     "time",
+    "topology",
 ];
 const ATTRIBUTE_KEYS: [&str; 8] =
     ["components", "labels", "max", "mean", "min", "name", "sum", "type"];
@@ -173,6 +176,23 @@ fn cells_and_notes_are_in_the_object() {
     assert!(objects[0]["cell"]["vectors"].is_array(), "{}", objects[0]);
 }
 
+/// Parts have their numbers and names, and bonds and the topology are there.
+#[test]
+fn parts_bonds_and_the_topology_are_in_the_object() {
+    let objects = inspect(&[sample("hdf5/gadget.hdf5").display().to_string()], 0);
+    let parts = objects[0]["parts"].as_array().expect("parts");
+    assert!(parts.iter().any(|part| part["number"] == 0 && part["name"] == "PartType0"));
+    let file = sample("molecules/water.gro").display().to_string();
+    let objects = inspect(std::slice::from_ref(&file), 0);
+    assert!(objects[0]["parts"].is_null() && objects[0]["topology"].is_null());
+    assert_eq!(objects[0]["bonds"], 0);
+    let arguments = ["inspect", "--json", &file, "--topology", &file];
+    let text = Workshop::new().run(&arguments).expect(0).text();
+    let first = text.lines().next().expect("a frame");
+    let object: Value = serde_json::from_str(first).expect("an object");
+    assert_eq!(object["topology"], file.as_str());
+}
+
 /// As text, steps that are like the one before are counted.
 #[test]
 fn a_long_trajectory_has_its_first_and_last_step_as_text() {
@@ -190,6 +210,34 @@ fn a_long_trajectory_has_its_first_and_last_step_as_text() {
     for skipped in ["... 19 steps with as many", "... 17 steps with as many"] {
         assert!(text.contains(skipped), "{text}");
     }
+    assert!(text.ends_with("  all 40 steps: 3 to 4 particles, the same attributes\n"), "{text}");
+}
+
+/// So do the files of a directory, with what differs.
+#[test]
+fn a_long_sequence_of_files_has_its_first_and_last_as_text() {
+    let workshop = Workshop::new();
+    std::fs::create_dir(workshop.join("run")).expect("a directory");
+    for number in 0..10 {
+        let comment = if number < 5 {
+            format!("Lattice=\"{} 0 0 0 9 0 0 0 9\" Time={number}", number + 9)
+        } else {
+            format!("Time={number}")
+        };
+        let text = format!("1\n{comment}\nC 0 0 0\n");
+        std::fs::write(workshop.join(format!("run/f_{number}.xyz")), text).expect("a file");
+    }
+    let text = workshop.run(&["inspect", "run"]).expect(0).text();
+    let shown: Vec<&str> = text.lines().filter(|line| line.starts_with("run/")).collect();
+    assert_eq!(shown.len(), 3, "{text}");
+    assert!(shown[1].starts_with("run/f_5.xyz") && shown[2].starts_with("run/f_9.xyz"), "{text}");
+    let end = "  all 10 files: 1 particles each, time 0 to 9, the same attributes, 5 with a cell\n";
+    assert!(text.contains("... 4 files with as many") && text.ends_with(end), "{text}");
+    let objects = workshop.run(&["inspect", "run", "--json"]).expect(0).text();
+    assert_eq!(objects.lines().count(), 10);
+    // A damaged one is named, whichever it is
+    std::fs::write(workshop.join("run/f_3.xyz"), "x").expect("a file");
+    workshop.run(&["inspect", "run"]).expect(1).prints("run/f_3.xyz");
 }
 
 #[test]

@@ -106,7 +106,8 @@ impl Reader for Gadget {
         }
         if header.file_count > 1 {
             notes.push(format!(
-                "one of {} files of a snapshot, which are frames of their own",
+                "one of {} files of a snapshot; give their directory, or a pattern such as snap_010.*, to read them \
+                 together",
                 header.file_count
             ));
         }

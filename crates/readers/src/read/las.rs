@@ -1,8 +1,10 @@
-//! LAS point clouds (`.las`), versions 1.0 to 1.4, formats of points 0 to 10.
+//! LAS point clouds (`.las`), versions 1.0 to 1.4, formats of points 0 to 10, also compressed (`.laz`).
 //!
 //! A header, records of variable length, then points of equal length: coordinates in integers with a scale and an offset,
 //! and what the format of points adds. Bytes beyond that are described by a record (`Extra Bytes`). After "LAS
-//! Specification 1.4 - R15" of the ASPRS. LAZ, the compressed form, is refused.
+//! Specification 1.4 - R15" of the ASPRS.
+
+use std::borrow::Cow;
 
 use glam::DVec3;
 
@@ -10,10 +12,12 @@ use super::columns::{self, ComponentStride, ParticleLayout, StridedColumn, check
 use super::numbers::NumberReader;
 use super::{ByteSource, CUT_SHORT, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, FormatInfo, Reader};
+use crate::reader::{Confidence, FileExtent, FormatInfo, Reader};
 use spherule_frame::{
     Attribute, AttributeData, Endian, ParseError, Positions, RawParticles, ScalarType,
 };
+
+mod laz;
 
 /// LAS point clouds.
 pub const FORMAT: Format = Format::new(&Las);
@@ -30,14 +34,11 @@ const LARGE_HEADER: usize = 255;
 /// The format of points has this bit in compressed files.
 const COMPRESSED: u8 = 0x80;
 /// Where the record of variable length with the extra bytes names itself.
-const EXTRA_USER: &[u8] = b"LASF_Spec\0";
+const EXTRA_USER: &[u8] = b"LASF_Spec";
 const EXTRA_RECORD: u16 = 4;
 /// Bytes of the header of such a record, and of the description of a value in it.
 const RECORD_HEADER: usize = 54;
 const DESCRIPTION: usize = 192;
-
-const LAZ: &str = "a LAZ file, which is a compressed LAS file and is not read; decompress it (`pdal translate in.laz out.las`, \
-                   or `laszip -i in.laz -o out.las`)";
 
 impl Reader for Las {
     fn info(&self) -> FormatInfo {
@@ -45,10 +46,6 @@ impl Reader for Las {
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
-        if head.starts_with(MAGIC) {
-            let format = head.get(POINT_FORMAT).copied().unwrap_or_default();
-            check_not_compressed(format)?;
-        }
         Ok(Confidence::signature_if(head.starts_with(MAGIC)))
     }
 
@@ -62,6 +59,12 @@ impl Reader for Las {
         let budget = source.budget();
         let bytes = source.bytes();
         let header = LasHeader::parse(bytes)?;
+        let bytes = if header.is_compressed {
+            Cow::Owned(laz::unpack(bytes, &header, budget)?)
+        } else {
+            Cow::Borrowed(bytes)
+        };
+        let (bytes, budget) = (&*bytes, budget.less(header.unpacked_len()));
         check_room(header.start, header.count, header.record, bytes.len())?;
         let attributes = header.attributes(bytes);
         let layout = ParticleLayout::new(header.count, Vec::new(), Vec::new());
@@ -86,11 +89,21 @@ impl Reader for Las {
         Ok(RawParticles { positions, attributes: read, ..RawParticles::default() })
     }
 
+    /// Points that have been decompressed.
+    fn unpacked_arrays_len(&self, head: &[u8], _: FileExtent, _: &RawParticles) -> u64 {
+        LasHeader::parse(head).map_or(0, |header| header.unpacked_len())
+    }
+
     fn notes(&self, bytes: &[u8]) -> Vec<String> {
         let Ok(header) = LasHeader::parse(bytes) else {
             return Vec::new();
         };
-        let mut notes = vec![format!("LAS 1.{}, format of points {}", header.minor, header.format)];
+        let name = if header.is_compressed { "LAZ" } else { "LAS" };
+        let mut notes =
+            vec![format!("{name} 1.{}, format of points {}", header.minor, header.format)];
+        if header.is_compressed && header.format > 5 {
+            notes.push("times of compressed points (gps_time) are not read".to_owned());
+        }
         let (_, left_out) = header.extra_columns(bytes);
         if !left_out.is_empty() {
             let names = left_out.join(", ");
@@ -102,10 +115,6 @@ impl Reader for Las {
     }
 }
 
-fn check_not_compressed(format: u8) -> Result<(), ParseError> {
-    if format & COMPRESSED == 0 { Ok(()) } else { Err(ParseError::unsupported(LAZ)) }
-}
-
 struct LasHeader {
     minor: u8,
     /// Bytes of the header, and number of the records behind it.
@@ -113,6 +122,7 @@ struct LasHeader {
     records: usize,
     /// Format, length and number of points, and where they start.
     format: u8,
+    is_compressed: bool,
     record: usize,
     count: usize,
     start: usize,
@@ -134,8 +144,10 @@ impl LasHeader {
         let len = usize::from(u16::from_le_bytes(at(94).array()?));
         let start = u32::from_le_bytes(at(96).array()?) as usize;
         let records = u32::from_le_bytes(at(100).array()?) as usize;
-        let [format] = at(POINT_FORMAT).array()?;
-        check_not_compressed(format)?;
+        let [stored] = at(POINT_FORMAT).array()?;
+        // The next bit is set in some compressed files, too
+        let is_compressed = stored & COMPRESSED != 0;
+        let format = if is_compressed { stored & 0x3f } else { stored };
         let record = usize::from(u16::from_le_bytes(at(105).array()?));
         let Some((least, ..)) = offsets(format) else {
             let what = format!("the format of points {format}; formats 0 to 10 are read");
@@ -165,7 +177,13 @@ impl LasHeader {
                 format!("the scale {scale} or the offset {offset} of coordinates is damaged");
             return Err(ParseError::malformed(131, what));
         }
-        Ok(Self { minor, len, records, format, record, count, start, scale, offset })
+        Ok(Self { minor, len, records, format, is_compressed, record, count, start, scale, offset })
+    }
+
+    /// Bytes of the file with its points decompressed; 0 if they are not compressed.
+    fn unpacked_len(&self) -> u64 {
+        let points = self.count.saturating_mul(self.record);
+        if self.is_compressed { self.start.saturating_add(points) as u64 } else { 0 }
     }
 
     /// Numbers at byte `offset` of each point.
@@ -198,7 +216,10 @@ impl LasHeader {
             ("color", self.color_type(bytes, color), 3, color),
             ("nir", ScalarType::U16, 1, infrared),
         ];
-        for (name, scalar, components, offset) in optional.into_iter().filter(|column| column.3 > 0)
+        let is_there =
+            |name: &str, offset| offset > 0 && !(self.is_compressed && name == "gps_time");
+        for (name, scalar, components, offset) in
+            optional.into_iter().filter(|column| is_there(column.0, column.3))
         {
             let mut column = self.column(name, scalar, components, offset);
             if name == "color" {
@@ -251,21 +272,25 @@ impl LasHeader {
         &self,
         bytes: &'a [u8],
     ) -> impl Iterator<Item = &'a [u8; DESCRIPTION]> {
+        let record = self.record_of(bytes, EXTRA_USER, EXTRA_RECORD);
+        record.map_or(&[][..], |(_, body)| body.as_chunks().0).iter()
+    }
+
+    /// The record of variable length that `user` numbers `id`, and where it is.
+    fn record_of<'a>(&self, bytes: &'a [u8], user: &[u8], id: u16) -> Option<(usize, &'a [u8])> {
         let mut at = self.len;
         for _ in 0..self.records {
-            let Some(header) = bytes.get(at..).and_then(|rest| rest.get(..RECORD_HEADER)) else {
-                break;
-            };
+            let header = bytes.get(at..)?.get(..RECORD_HEADER)?;
             let number = |place: usize| u16::from_le_bytes([header[place], header[place + 1]]);
-            let (id, len) = (number(18), usize::from(number(20)));
+            let len = usize::from(number(20));
             at += RECORD_HEADER;
-            if header[2..].starts_with(EXTRA_USER) && id == EXTRA_RECORD {
-                let body = bytes.get(at..).and_then(|rest| rest.get(..len)).unwrap_or_default();
-                return body.as_chunks().0.iter();
+            let name = header[2..18].split(|byte| *byte == 0).next();
+            if name == Some(user) && number(18) == id {
+                return Some((at, bytes.get(at..)?.get(..len).unwrap_or_default()));
             }
             at += len;
         }
-        [].iter()
+        None
     }
 }
 
@@ -410,7 +435,11 @@ mod tests {
         };
         for (place, value, message) in [
             (0, &b"X"[..], "begins with LASF"),
-            (POINT_FORMAT, &[3 | COMPRESSED], "pdal translate in.laz out.las"),
+            (
+                POINT_FORMAT,
+                &[3 | COMPRESSED],
+                "whose times cannot be decoded safely; decompress it",
+            ),
             (POINT_FORMAT, &[11], "formats 0 to 10"),
             (105, &[10, 0], "points of 10 bytes, format 3 has 34"),
             (107, &[255; 4], "4294967295 particles need"),
@@ -420,8 +449,5 @@ mod tests {
             assert!(error(place, value).contains(message), "{} | {message}", error(place, value));
         }
         READER.survives_truncation(&good, &[4, 104, 130, 227], good.len());
-        let mut compressed = good.clone();
-        compressed[POINT_FORMAT] |= COMPRESSED;
-        assert!(FORMAT.reader().sniff(&compressed).is_err());
     }
 }

@@ -127,6 +127,15 @@ struct PcdHeader {
     body: usize,
 }
 
+/// The number of points, or of those of a side.
+fn count(value: Line<'_>) -> Result<usize, ParseError> {
+    let count = text::integer(value.text).and_then(|count| usize::try_from(count).ok());
+    count.ok_or_else(|| {
+        let what = format!("{} is not a number of points", text::shown(value.text));
+        ParseError::malformed(value.at, what)
+    })
+}
+
 impl PcdHeader {
     fn parse(bytes: &[u8]) -> Result<Self, ParseError> {
         let mut lines = Lines::new(bytes, 0..bytes.len());
@@ -134,15 +143,14 @@ impl PcdHeader {
         let (mut points, mut width, mut height) = (None, None, None);
         while let Some(line) = lines.next() {
             let (keyword, value) = split_keyword(line);
-            let number = || text::integer(value.text).and_then(|n| usize::try_from(n).ok());
             match keyword {
                 b"FIELDS" | b"COLUMNS" => fields = Some(value),
                 b"SIZE" => sizes = Some(value),
                 b"TYPE" => types = Some(value),
                 b"COUNT" => counts = Some(value),
-                b"WIDTH" => width = number(),
-                b"HEIGHT" => height = number(),
-                b"POINTS" => points = number(),
+                b"WIDTH" => width = Some(count(value)?),
+                b"HEIGHT" => height = Some(count(value)?),
+                b"POINTS" => points = Some(count(value)?),
                 b"VERSION" | b"VIEWPOINT" | b"" => {}
                 b"DATA" => {
                     let encoding = match value.text {

@@ -12,6 +12,7 @@ use spherule_frame::MemoryBudget;
 pub struct ByteSource<'a> {
     text: TextInput<'a>,
     budget: MemoryBudget,
+    has_mesh_points: bool,
     /// The owner of all bytes, if there is one that can be shared.
     shared: Option<&'a SharedBytes>,
 }
@@ -29,12 +30,23 @@ impl<'a> ByteSource<'a> {
 
     /// Content that is read through `text`.
     pub const fn from_text(text: TextInput<'a>) -> Self {
-        Self { text, budget: MemoryBudget::UNLIMITED, shared: None }
+        let budget = MemoryBudget::UNLIMITED;
+        Self { text, budget, has_mesh_points: false, shared: None }
     }
 
     /// Limits what is read from here, except the bytes themselves.
     pub const fn limit(&mut self, budget: MemoryBudget) {
         self.budget = budget;
+    }
+
+    /// Says whether the vertices of a mesh are particles; otherwise a mesh is refused.
+    pub const fn set_mesh_points(&mut self, are_particles: bool) {
+        self.has_mesh_points = are_particles;
+    }
+
+    /// Whether the vertices of a mesh are particles.
+    pub const fn has_mesh_points(&self) -> bool {
+        self.has_mesh_points
     }
 
     /// How much memory all that is read from here may take.

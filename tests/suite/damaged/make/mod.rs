@@ -10,10 +10,12 @@ use spherule_formats::{ParticleFrame, native};
 use zip::write::{SimpleFileOptions, ZipWriter};
 
 mod base;
+mod clouds;
 mod gsd;
 mod text;
 
 use base::{Base, find, replace};
+use clouds::{gadget, geo, las, laz, pcd};
 use gsd::gsd;
 use text::{csv, lammps, rst7, vtk_ascii, xyz};
 
@@ -28,7 +30,10 @@ const NAN: [[f32; 3]; 3] = [WHOLE[0], [f32::NAN, 0.5, 0.25], WHOLE[2]];
 /// All files.
 pub(super) fn files() -> Vec<Made> {
     let mut all = vec![("empty.vtk".to_owned(), Vec::new())];
-    for kind in [vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd] {
+    for kind in [
+        vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd, las, laz,
+        pcd, gadget, geo,
+    ] {
         all.extend(kind());
     }
     all

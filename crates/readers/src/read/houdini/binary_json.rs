@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 
 use super::super::numbers::NumberReader;
+use super::tokens::{ElementType, Token, UniformArray, Value};
 use spherule_frame::{Endian, MemoryBudget, ParseError, ScalarType};
 
 /// The first bytes of a file of a little-endian machine, and of a big-endian one.
@@ -21,76 +22,19 @@ pub(super) fn endian(head: &[u8]) -> Option<Endian> {
     found.map(|(_, endian)| *endian)
 }
 
-/// One token.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Token<'a> {
-    /// Offset of its first byte.
-    pub(super) at: usize,
-    pub(super) value: Value<'a>,
-}
-
-/// What a token means.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Value<'a> {
-    Null,
-    Bool(bool),
-    Integer(i64),
-    Real(f64),
-    Text(&'a [u8]),
-    Uniform(UniformArray<'a>),
-    Begin,
-    End,
-}
-
-/// The type of the elements of a uniform array.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ElementType {
-    /// Bits, in words of 32.
-    Bits,
-    /// Half precision.
-    Half,
-    Number(ScalarType),
-    /// Strings, or references to names.
-    Text,
-}
-
-/// Elements of one type.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct UniformArray<'a> {
-    pub(super) element: ElementType,
-    pub(super) count: usize,
-    /// The elements as they are in the file.
-    pub(super) bytes: &'a [u8],
-}
-
 /// Reads token after token.
-pub(super) struct JsonCursor<'a> {
+pub(super) struct BinaryTokens<'a> {
     bytes: &'a [u8],
     reader: NumberReader<'a>,
-    pub(super) endian: Endian,
     names: HashMap<u64, &'a [u8]>,
     budget: MemoryBudget,
 }
 
-impl<'a> JsonCursor<'a> {
+impl<'a> BinaryTokens<'a> {
     /// Before the first token of `bytes`. Definitions of names take no more than `budget`.
-    ///
-    /// # Errors
-    /// [`ParseError::Malformed`] if `bytes` are no binary JSON.
-    pub(super) fn new(bytes: &'a [u8], budget: MemoryBudget) -> Result<Self, ParseError> {
-        let endian = endian(bytes).ok_or_else(|| {
-            ParseError::malformed(
-                0,
-                "not Houdini's binary JSON: the file does not begin with \\x7fNSJb",
-            )
-        })?;
-        Ok(Self {
-            bytes,
-            reader: NumberReader::new(bytes, MAGICS[0].0.len(), endian),
-            endian,
-            names: HashMap::new(),
-            budget,
-        })
+    pub(super) fn new(bytes: &'a [u8], endian: Endian, budget: MemoryBudget) -> Self {
+        let reader = NumberReader::new(bytes, MAGICS[0].0.len(), endian);
+        Self { bytes, reader, names: HashMap::new(), budget }
     }
 
     /// The next token.
@@ -136,75 +80,6 @@ impl<'a> JsonCursor<'a> {
                 }
             };
             return Ok(Token { at, value });
-        }
-    }
-
-    /// Skips the rest of the value that begins with `token`.
-    ///
-    /// # Errors
-    /// As [`Self::next`].
-    pub(super) fn skip(&mut self, token: Token<'a>) -> Result<(), ParseError> {
-        let mut depth = usize::from(matches!(token.value, Value::Begin));
-        while depth > 0 {
-            match self.next()?.value {
-                Value::Begin => depth += 1,
-                Value::End => depth -= 1,
-                _ => {}
-            }
-        }
-        Ok(())
-    }
-
-    /// Calls `each` with the names and values of the map, or list of pairs, that `token` begins. `each` reads the rest
-    /// of a value.
-    ///
-    /// # Errors
-    /// As [`Self::next`]; [`ParseError::Malformed`] for anything else; errors of `each`.
-    pub(super) fn pairs(
-        &mut self,
-        token: Token<'a>,
-        mut each: impl FnMut(&mut Self, &'a [u8], Token<'a>) -> Result<(), ParseError>,
-    ) -> Result<(), ParseError> {
-        if !matches!(token.value, Value::Begin) {
-            return Err(unexpected(token.at, "names and values"));
-        }
-        loop {
-            let key = self.next()?;
-            match key.value {
-                Value::End => return Ok(()),
-                Value::Text(name) => {
-                    let value = self.next()?;
-                    if matches!(value.value, Value::End) {
-                        return Err(unexpected(value.at, "a value"));
-                    }
-                    each(self, name, value)?;
-                }
-                _ => return Err(unexpected(key.at, "a name")),
-            }
-        }
-    }
-
-    /// Calls `each` with the elements of the array that `token` begins and their indices. `each` reads the rest of an
-    /// element.
-    ///
-    /// # Errors
-    /// As [`Self::pairs`].
-    pub(super) fn elements(
-        &mut self,
-        token: Token<'a>,
-        mut each: impl FnMut(&mut Self, usize, Token<'a>) -> Result<(), ParseError>,
-    ) -> Result<(), ParseError> {
-        if !matches!(token.value, Value::Begin) {
-            return Err(unexpected(token.at, "an array"));
-        }
-        let mut index = 0;
-        loop {
-            let element = self.next()?;
-            if matches!(element.value, Value::End) {
-                return Ok(());
-            }
-            each(self, index, element)?;
-            index += 1;
         }
     }
 
@@ -308,9 +183,4 @@ impl<'a> JsonCursor<'a> {
         let len = count.saturating_mul(size);
         self.take(len).map(|_| ())
     }
-}
-
-/// The error for a token that the layout of geometry does not have at `at`.
-pub(super) fn unexpected(at: usize, what: &str) -> ParseError {
-    ParseError::malformed(at, format!("{what} expected here: the file is damaged here"))
 }

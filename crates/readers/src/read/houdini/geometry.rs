@@ -1,11 +1,12 @@
-//! The layout of geometry in binary JSON: counts, attributes of points, types of primitives.
+//! The layout of geometry: counts, attributes of points, types of primitives.
 //!
 //! The file is a list of names and values. Attributes are pairs of a definition and values, by what they belong to.
 //! Values of strings are indices into a table, as in classic files. After `hgeo.py`, which comes with Houdini, and the
 //! open readers `bgeo_reader` of Laika and `houio`.
 
-use super::binary_json::{JsonCursor, Token, Value, unexpected};
+use super::cursor::JsonCursor;
 use super::paged::{StoredValues, count};
+use super::tokens::{Token, Value, unexpected};
 use spherule_frame::{MemoryBudget, ParseError};
 
 /// Most types of primitives that are listed.
@@ -22,6 +23,8 @@ pub(super) struct Geometry<'a> {
     pub(super) primitive_types: Vec<String>,
     /// Attributes of types that are not read.
     pub(super) unread: Vec<String>,
+    /// Bytes of numbers in memory.
+    numbers_len: u64,
 }
 
 /// An attribute of points.
@@ -93,7 +96,9 @@ impl<'a> Geometry<'a> {
                     if key != wanted {
                         return cursor.skip(value);
                     }
-                    values = Some(StoredValues::read(cursor, value, budget)?);
+                    let stored = StoredValues::read(cursor, value, budget.less(self.numbers_len))?;
+                    self.numbers_len += stored.numbers_len();
+                    values = Some(stored);
                     Ok(())
                 })
             }

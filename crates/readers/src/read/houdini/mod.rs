@@ -1,7 +1,8 @@
-//! Geometry of Houdini 12 and later (`.bgeo`, and `.bgeo.sc` as `compression` decodes it), in binary JSON.
+//! Geometry of Houdini 12 and later: binary JSON (`.bgeo`, and `.bgeo.sc` as `compression` decodes it) and text (`.geo`).
 //!
-//! `binary_json` reads tokens, `numbers` arrays of them, `paged` the values of an attribute, `geometry` the layout of
-//! the file. Only points are read. Classic files, which have the same extension, are read by [`super::bgeo`].
+//! `binary_json` and `text_json` read `tokens`, which `cursor` walks through; `numbers` reads arrays of them, `paged` the
+//! values of an attribute, `geometry` the layout of the file. Only points are read. Classic files, which have the same
+//! extension, are read by [`super::bgeo`].
 
 use glam::{DVec3, Vec3};
 
@@ -11,11 +12,14 @@ use crate::reader::{Confidence, FileExtent, FormatInfo, Reader};
 use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
 
 mod binary_json;
+mod cursor;
 mod geometry;
 mod numbers;
 mod paged;
 #[cfg(test)]
 mod tests;
+mod text_json;
+mod tokens;
 
 use geometry::Geometry;
 
@@ -25,16 +29,16 @@ pub const FORMAT: Format = Format::new(&Houdini);
 struct Houdini;
 
 impl Reader for Houdini {
-    /// Those with the name of their compression; `.bgeo` is in the list of classic files.
+    /// Those of text, and with the name of their compression; `.bgeo` is in the list of classic files.
     fn info(&self) -> FormatInfo {
         FormatInfo {
             notes_need_whole_file: true,
-            ..FormatInfo::new("houdini", &["bgeosc", "bgeogz"])
+            ..FormatInfo::new("houdini", &["bgeosc", "bgeogz", "geo"])
         }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
-        Ok(Confidence::signature_if(binary_json::endian(head).is_some()))
+        Ok(Confidence::signature_if(cursor::endian(head).is_some()))
     }
 
     fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
@@ -53,16 +57,13 @@ impl Reader for Houdini {
         particles(bytes, &geometry, budget)
     }
 
-    /// The numbers of the largest attribute as they are stored.
-    fn unpacked_arrays_len(
-        &self,
-        _head: &[u8],
-        _file: FileExtent,
-        particles: &RawParticles,
-    ) -> u64 {
+    /// The numbers of the largest attribute as they are stored; of text, all numbers in double precision.
+    fn unpacked_arrays_len(&self, head: &[u8], _file: FileExtent, particles: &RawParticles) -> u64 {
         // Positions may have a fourth component
         let largest = particles.largest_array_len();
-        largest + largest / 3
+        let stored = largest + largest / 3;
+        let is_text = binary_json::endian(head).is_none();
+        if is_text { 2 * (particles.byte_len() + stored) } else { stored }
     }
 
     fn notes(&self, bytes: &[u8]) -> Vec<String> {
@@ -110,8 +111,8 @@ fn particles(
     let count = geometry.point_count;
     let count =
         count.ok_or_else(|| ParseError::malformed(end, "the file has no number of points"))?;
-    let endian = binary_json::endian(bytes)
-        .ok_or_else(|| ParseError::malformed(0, "not Houdini's binary JSON"))?;
+    let endian =
+        cursor::endian(bytes).ok_or_else(|| ParseError::malformed(0, "not geometry of Houdini"))?;
     let mut particles =
         RawParticles { positions: Positions::F32(Vec::new()), ..RawParticles::default() };
     let mut has_positions = false;

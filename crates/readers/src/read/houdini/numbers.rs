@@ -1,6 +1,7 @@
 //! Numbers in arrays of all kinds, uniform or not.
 
-use super::binary_json::{ElementType, JsonCursor, Token, UniformArray, Value, unexpected};
+use super::cursor::JsonCursor;
+use super::tokens::{ElementType, Token, UniformArray, Value, unexpected};
 use spherule_frame::{AttributeData, Endian, MemoryBudget, ParseError, ScalarType};
 
 /// Numbers as they are in the file.
@@ -57,6 +58,14 @@ impl<'a> Numbers<'a> {
             Self::Uniform(array) => array.count,
             Self::Integers(numbers) => numbers.len(),
             Self::Reals(numbers) => numbers.len(),
+        }
+    }
+
+    /// Bytes that the numbers take beside the file.
+    pub(super) const fn byte_len(&self) -> u64 {
+        match self {
+            Self::Uniform(_) => 0,
+            Self::Integers(_) | Self::Reals(_) => 8 * self.len() as u64,
         }
     }
 

@@ -4,8 +4,9 @@
 //! elements, then the second ones. A flag for each page and packed vector says that all elements of the page share one
 //! vector, which is stored once. Text files have tuples, or one array for each component, instead.
 
-use super::binary_json::{JsonCursor, Token, Value, unexpected};
+use super::cursor::JsonCursor;
 use super::numbers::{Numbers, flags};
+use super::tokens::{Token, Value, unexpected};
 use spherule_frame::{AttributeData, Endian, MemoryBudget, ParseError, ScalarType};
 
 /// Most elements of a page; Houdini writes 1024. The limit keeps a few constant pages from standing for any number of
@@ -84,6 +85,11 @@ impl<'a> StoredValues<'a> {
             Ok(())
         })?;
         Ok(this)
+    }
+
+    /// Bytes that the numbers take beside the file.
+    pub(super) fn numbers_len(&self) -> u64 {
+        self.numbers.as_ref().map_or(0, |(_, numbers)| numbers.byte_len())
     }
 
     fn read_numbers(

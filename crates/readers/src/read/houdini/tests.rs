@@ -2,8 +2,12 @@
 
 use proptest::prelude::*;
 
+use super::cursor::JsonCursor;
+use super::numbers::Numbers;
+use super::tokens::{ElementType, Value};
 use super::*;
 use crate::read::damage::{TestedReader, attribute, coordinates, mutate, names, numbers, sample};
+use spherule_frame::ScalarType;
 
 const READER: TestedReader = TestedReader {
     steps: |bytes| FORMAT.steps(bytes),
@@ -221,7 +225,124 @@ fn truncated_files_are_detected() {
     }
 }
 
+/// The tokens of the binary file `bytes` as text, as Houdini writes `.geo`.
+fn as_text(bytes: &[u8]) -> Vec<u8> {
+    let mut cursor = JsonCursor::new(bytes, MemoryBudget::UNLIMITED).expect("binary JSON");
+    let (mut text, mut depth) = (String::new(), 0);
+    loop {
+        let token = cursor.next().expect("a token");
+        match token.value {
+            Value::Begin => text.push('['),
+            Value::End => text.push(']'),
+            Value::Null => text.push_str("null"),
+            Value::Bool(flag) => text.push_str(if flag { "true" } else { "false" }),
+            Value::Integer(number) => text += &number.to_string(),
+            Value::Real(number) => text += &format!("{number:?}"),
+            Value::Text(name) => text += &format!("\"{}\"", String::from_utf8_lossy(name)),
+            Value::Uniform(array) if array.element == ElementType::Text => text += "[\"text\"]",
+            Value::Uniform(_) => {
+                let read = Numbers::read(&mut cursor, token, MemoryBudget::UNLIMITED);
+                let data = read.expect("numbers").decode(cursor.endian, ScalarType::F64, 0);
+                let AttributeData::F64(numbers) = data.expect("numbers") else { unreachable!() };
+                // Integers without a point
+                let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
+                text += &format!("[{}]", words.join(", "));
+            }
+        }
+        depth += i32::from(matches!(token.value, Value::Begin));
+        depth -= i32::from(matches!(token.value, Value::End));
+        if depth == 0 {
+            return text.into_bytes();
+        }
+        let is_begin = matches!(token.value, Value::Begin);
+        text.push_str(if is_begin { "\n\t" } else { ",\n" });
+    }
+}
+
+#[test]
+fn text_has_the_particles_and_notes_of_the_same_binary_file() {
+    for name in ["flip_12", "pages", "empty"] {
+        let binary = sample(&format!("houdini/{name}.bgeo"));
+        let text = as_text(&binary);
+        assert_eq!(Houdini.sniff(&text), Ok(Confidence::Signature), "{name}");
+        // Values that are NaN differ from themselves
+        let shown = |bytes: &[u8]| format!("{:?}", READER.one(bytes));
+        assert_eq!(shown(&text), shown(&binary), "{name}");
+        assert_eq!(Houdini.notes(&text), Houdini.notes(&binary), "{name}");
+        READER.survives_truncation(&text, &[0, 1, 20, text.len() - 1], 200);
+    }
+}
+
+/// A file as text, with `values` of the attribute P.
+fn text_file(count: &str, values: &str) -> String {
+    format!(
+        "[\n\t\"fileversion\",\"20.5.278\",\n\t\"hasindex\",false,\n\t\"pointcount\",{count},\n\t\"info\",{{\"a\\\"]\":\"b\"}},\n\t\
+         \"attributes\",[\"pointattributes\",[[[\"scope\",\"public\",\"type\",\"numeric\",\"name\",\"P\"],\n\t\
+         [\"size\",3,\"storage\",\"fpreal32\",\"values\",[\"size\",3,\"storage\",\"fpreal32\",{values}]]]]]\n]\n"
+    )
+}
+
+#[test]
+fn text_is_read_as_houdini_writes_it() {
+    let text = text_file("2", "\"tuples\",[[1.5,-2,3e-1],[0,1,nan]]");
+    let found = READER.one(text.as_bytes());
+    let Positions::F32(positions) = &found.positions else { panic!("{found:?}") };
+    assert_eq!(positions[0], Vec3::new(1.5, -2.0, 0.3));
+    assert!(positions[1].z.is_nan());
+    assert_eq!(Houdini.notes(text.as_bytes()), ["geometry of Houdini 20.5.278"]);
+}
+
+#[test]
+fn damaged_text_is_named() {
+    let tuples = "\"tuples\",[[1,2,3],[4,5,6]]";
+    let good = text_file("2", tuples);
+    assert_eq!(READER.one(good.as_bytes()).positions.len(), 2);
+    let error = |text: &str| READER.error_inside(text.as_bytes()).to_string();
+    for (text, expected) in [
+        (text_file("3", tuples), "attribute `P`"),
+        (text_file("2", "\"tuples\",[[1,2,3],[4,5]]"), "attribute `P`"),
+        (text_file("2", "\"tuples\",[[1,2,3],[4,x,6]]"), "`x` is not a number"),
+        (text_file("2", "\"tuples\",[[1,2,3],[4,\"a\",6]]"), "a number expected here"),
+        (text_file("-2", tuples), "the count -2"),
+        (text_file("\"2\"", tuples), "a count expected here"),
+        (text_file("2", "\"sizes\",[]"), "attribute `P` has no"),
+        (text_file("99999999999", tuples), "attribute `P`"),
+        (good.replace("\"P\"", "\"Q\""), "no positions (attribute P)"),
+        (good.replace("fpreal32", "int128"), "unknown type `int128`"),
+        (good.replace("\"pointcount\"", "\"count\""), "no number of points"),
+        (good.trim_end().trim_end_matches(']').to_owned(), "does not end"),
+        ("[\"fileversion\",\"20".to_owned(), "a string does not end"),
+    ] {
+        let found = error(&text);
+        assert!(found.contains(expected), "{found}, not {expected}");
+    }
+}
+
+#[test]
+fn numbers_of_text_are_bounded_by_the_budget() {
+    // Each of two attributes fits, but not both
+    let values = format!("\"tuples\",[{}]", "[0,0,0],".repeat(1000));
+    let one = text_file("1000", &values);
+    let (start, end) = one.split_once("[[[\"scope").expect("the attribute");
+    let attribute = end.rsplit_once("]]\n]").expect("its end").0;
+    let two = format!("{start}[[[\"scope{attribute},[[\"scope{attribute}]]\n]");
+    let read = |text: &str, budget| {
+        let mut source = ByteSource::whole(text.as_bytes());
+        let budget = MemoryBudget::new(budget, "take care");
+        FORMAT.read_within(&mut source, &Step::whole(text.len()), budget).map(|_| ())
+    };
+    assert_eq!(read(&one, 100_000), Ok(()));
+    let error = read(&two, 40_000).expect_err("more numbers than memory");
+    assert!(matches!(error, ParseError::TooLarge { .. }), "{error}");
+}
+
 proptest! {
+    #[test]
+    fn mutations_of_text_never_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+        let text = as_text(&sample("houdini/flip_12.bgeo"));
+        let _ = READER.all(&mutate(&text, &changes));
+    }
+
     #[test]
     fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         let _ = READER.all(&bytes);

@@ -1,7 +1,8 @@
 //! PLY point clouds: ascii and binary of both byte orders, any order of properties.
 //!
 //! `header` reads the text on top, `body` finds (or repacks) the vertex records, and the shared
-//! column reader decodes them. Meshes are refused: their vertices are a surface, not particles. `mesh` reads those.
+//! column reader decodes them. Meshes are refused unless their vertices are asked for: these are a surface, not particles.
+//! `mesh` reads those.
 //! Follows Greg Turk's 1994 description and what Blender, Open3D and `CloudCompare` write beyond it.
 
 mod ascii;
@@ -42,8 +43,7 @@ impl Reader for Ply {
         (header.encoding == PlyEncoding::Ascii).then_some(StreamUnit::Words)
     }
 
-    /// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a mesh or a file
-    /// without vertices.
+    /// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a file without vertices.
     fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         let text = source.text();
         let header = PlyHeader::parse(text.head())?;
@@ -57,22 +57,31 @@ impl Reader for Ply {
     /// `scalar_` is dropped from names; list properties are skipped. Positions are f64 if a coordinate is
     /// `double` (or a 32-bit integer), else f32.
     fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
-        let budget = source.budget();
+        let (budget, has_mesh_points) = (source.budget(), source.has_mesh_points());
         let text = source.text();
         let bytes = text.head();
         let header = PlyHeader::parse(bytes)?;
-        let vertices = vertices(&header)?;
-        if header.encoding == PlyEncoding::Ascii {
-            let layout = vertices_layout(&header, vertices, 0, vertices.scalar_bytes())?;
-            return ascii::read(text, &header, vertices, layout, budget);
+        if !has_mesh_points {
+            refuse_mesh(&header)?;
         }
-        let records = body::vertex_records(bytes, &header, vertices)?;
-        records_layout(&header, vertices, &records)?.particles(&records.bytes)
+        let vertices = vertices(&header)?;
+        let mut particles = if header.encoding == PlyEncoding::Ascii {
+            let layout = vertices_layout(&header, vertices, 0, vertices.scalar_bytes())?;
+            ascii::read(text, &header, vertices, layout, budget)?
+        } else {
+            let records = body::vertex_records(bytes, &header, vertices)?;
+            records_layout(&header, vertices, &records)?.particles(&records.bytes)?
+        };
+        let faces = faces_text(&header).map(|(faces, _)| faces);
+        let note = |faces| format!("a mesh with {faces}: its vertices are read as particles");
+        particles.notes.extend(faces.map(note));
+        Ok(particles)
     }
 
     /// `None` if the vertices are text, or have lists between their numbers.
     fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
         let header = PlyHeader::parse(bytes)?;
+        refuse_mesh(&header)?;
         let vertices = vertices(&header)?;
         if header.encoding == PlyEncoding::Ascii || vertices.has_lists() {
             return Ok(None);
@@ -119,21 +128,29 @@ fn is_named(column: &StridedColumn, name: &str) -> bool {
     column.name.eq_ignore_ascii_case(name)
 }
 
+/// What a mesh consists of, and how else it is drawn; `None` for points. Strips are counted as one, and are not drawn.
+fn faces_text(header: &PlyHeader) -> Option<(String, &'static str)> {
+    let mut names = ["face", "tristrips"].iter();
+    let faces = names.find_map(|name| header.element(name).filter(|e| e.count > 0))?;
+    Some(match faces.name.as_str() {
+        "face" => (format!("{} faces", faces.count), "draw it with --mesh, or "),
+        _ => ("triangle strips".to_owned(), ""),
+    })
+}
+
+/// [`ParseError::Unsupported`] for a mesh.
+fn refuse_mesh(header: &PlyHeader) -> Result<(), ParseError> {
+    let Some((faces, remedy)) = faces_text(header) else {
+        return Ok(());
+    };
+    Err(ParseError::unsupported(format!(
+        "a mesh with {faces}, not particles: {remedy}read its vertices as particles with --mesh-points \
+         (input.mesh_points = true)"
+    )))
+}
+
 /// The element that holds the particles.
 fn vertices(header: &PlyHeader) -> Result<&Element, ParseError> {
-    let faces =
-        ["face", "tristrips"].iter().find_map(|name| header.element(name).filter(|e| e.count > 0));
-    if let Some(faces) = faces {
-        // Strips are counted as one, and are not drawn
-        let (count, remedy) = match faces.name.as_str() {
-            "face" => (format!("{} faces", faces.count), "draw it with --mesh, or "),
-            _ => ("triangle strips".to_owned(), ""),
-        };
-        return Err(ParseError::unsupported(format!(
-            "a mesh with {count}, not particles: {remedy}save its vertices alone, as a point cloud, with MeshLab, \
-             CloudCompare or Open3D"
-        )));
-    }
     header.element("vertex").ok_or_else(|| {
         let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
         ParseError::unsupported(format!(

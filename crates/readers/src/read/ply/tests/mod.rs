@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::read::damage::{TestedReader, attribute, coordinates, mutate, names, numbers, sample};
 use crate::read::pieces;
-use spherule_frame::{AttributeData, Positions};
+use spherule_frame::{AttributeData, MemoryBudget, Positions};
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
     pieces::steps(FORMAT, bytes)
@@ -73,14 +73,35 @@ fn all_encodings_contain_the_same_particles() {
     assert_eq!(double.attributes, expected.attributes);
 }
 
+/// The particles of `bytes`, vertices of meshes among them.
+fn with_mesh_points(bytes: &[u8]) -> RawParticles {
+    let mut source = ByteSource::whole(bytes);
+    source.set_mesh_points(true);
+    let step = Step::whole(bytes.len());
+    FORMAT.read_within(&mut source, &step, MemoryBudget::UNLIMITED).expect("a mesh")
+}
+
+#[test]
+fn vertices_of_meshes_are_particles_if_they_are_asked_for() {
+    let found = with_mesh_points(&sample("public_splashsurf/cube_normals.ply"));
+    assert_eq!((found.positions.len(), names(&found)), (24, vec!["normal", "s", "t"]));
+    assert_eq!(found.notes, ["a mesh with 12 faces: its vertices are read as particles"]);
+    // Faces before the vertices, and points without any
+    let header = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement vertex 2\n\
+                  property float x\nproperty float y\nproperty float z\nend_header\n3 0 1 0\n1 2 3\n4 5 6\n";
+    let found = with_mesh_points(header.as_bytes());
+    assert_eq!(coordinates(&found.positions), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    assert!(with_mesh_points(&points("1", &[], "1 2 3\n")).notes.is_empty());
+}
+
 #[test]
 fn mesh_is_rejected() {
     let error = READER.error(&sample("public_splashsurf/cube_normals.ply"));
     assert_eq!(
         error,
         ParseError::unsupported(
-            "a mesh with 12 faces, not particles: draw it with --mesh, or save its vertices alone, as a point cloud, \
-             with MeshLab, CloudCompare or Open3D"
+            "a mesh with 12 faces, not particles: draw it with --mesh, or read its vertices as particles with \
+             --mesh-points (input.mesh_points = true)"
         )
     );
     let strips = points(
@@ -90,7 +111,7 @@ fn mesh_is_rejected() {
     );
     let error = READER.error(&strips).to_string();
     assert!(
-        error.starts_with("a mesh with triangle strips, not particles: save its vertices"),
+        error.starts_with("a mesh with triangle strips, not particles: read its vertices"),
         "{error}"
     );
     let faceless =

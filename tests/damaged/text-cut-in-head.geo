@@ -1,0 +1,2 @@
+[
+	"fileversion","20.5

@@ -1,0 +1,13 @@
+[
+	"fileversion","20.5.278",
+	"hasindex",false,
+	"vertexcount",3,
+	"attributes",[
+		"pointattributes",[
+			[
+				["scope","public","type","numeric","name","P"],
+				["size",3,"storage","fpreal32","values",["size",3,"storage","fpreal32","tuples",[[0,0,0],[1,0.5,0.25],[2,1,0.5]]]]
+			]
+		]
+	]
+]
