@@ -33,51 +33,82 @@ pub(super) struct Level {
     pub(super) is_last: bool,
 }
 
-/// Part of the weight of an older picture that remains with each newer one.
-const MEMORY: f64 = 0.7;
+/// Factor between the samples of pictures that count as small and those that count as large.
+const LARGE: f64 = 4.0;
 
-/// Weight of the knowledge that no picture takes no time. Pictures of one size alone say nothing about others.
-const ORIGIN: f64 = 0.1;
+/// A small picture that takes so many times as long as it should shows that all that is known is out of date.
+const OUTDATED: f64 = 3.0;
 
-/// The time of pictures of a page: a fixed part, and one for each sample of a pixel, by least squares over those that
-/// were rendered.
+/// The time of pictures of a page: a fixed part, and one for each sample of a pixel. They follow from a small picture and
+/// a large one; pictures of one size alone cannot tell the parts apart.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Speed {
-    /// Weighted sums of 1, samples, seconds, squared samples, and samples times seconds.
-    sums: [f64; 5],
+    /// None until a picture was small beside the large one.
+    small: Option<Seen>,
+    large: Seen,
+    /// Whether the large one is a guess.
+    is_guess: bool,
+}
+
+/// The samples of a picture, all pixels together, and its seconds.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    work: f64,
+    seconds: f64,
+}
+
+impl Seen {
+    /// The mean of both if they are about as large, or else the newer one.
+    fn then(self, newer: Self) -> Self {
+        let ratio = newer.work / self.work;
+        if !(0.5..2.0).contains(&ratio) {
+            return newer;
+        }
+        let mean = |a: f64, b: f64| 0.5 * (a + b);
+        Self { work: mean(self.work, newer.work), seconds: mean(self.seconds, newer.seconds) }
+    }
 }
 
 impl Default for Speed {
     /// That of one slow core, until a picture was rendered.
     fn default() -> Self {
-        Self { sums: [0.0; 5] }.with(1e5, 0.1)
+        Self { small: None, large: Seen { work: 1e5, seconds: 0.1 }, is_guess: true }
     }
 }
 
 impl Speed {
     /// Learns from a picture that took `seconds`.
     pub(super) fn learn(&mut self, level: &Level, seconds: f64) {
-        *self = self.with(level.work(), seconds);
-    }
-
-    fn with(self, work: f64, seconds: f64) -> Self {
-        let new = [1.0, work, seconds, work * work, work * seconds];
-        let mut sums = self.sums.map(|sum| MEMORY * sum);
-        for (sum, own) in sums.iter_mut().zip(new) {
-            *sum += own;
+        let seen = Seen { work: level.work(), seconds };
+        let ratio = seen.work / self.large.work;
+        if self.is_guess {
+            *self = Self { small: None, large: seen, is_guess: false };
+        } else if ratio > LARGE {
+            *self = Self { small: Some(self.large), large: seen, ..*self };
+        } else if ratio * LARGE >= 1.0 {
+            self.large = self.large.then(seen);
+        } else {
+            let small = self.small.map_or(seen, |small| small.then(seen));
+            let is_outdated =
+                self.small.is_some() && small.seconds > OUTDATED * self.seconds(level);
+            *self = if is_outdated {
+                Self { small: None, large: small, ..*self }
+            } else {
+                Self { small: Some(small), ..*self }
+            };
         }
-        Self { sums }
     }
 
     /// The fixed part, and that of a sample, seconds.
     fn parts(&self) -> [f64; 2] {
-        let [count, work, seconds, squares, products] = self.sums;
-        let count = count + ORIGIN;
-        let slope = (count * products - work * seconds) / (count * squares - work * work);
+        let Seen { work, seconds } = self.large;
+        let through_origin = seconds / work;
+        let Some(small) = self.small else { return [0.0, through_origin] };
         // Neither is negative, whatever the noise
-        let through_origin = products / squares;
+        let slope = (seconds - small.seconds) / (work - small.work);
         let slope = slope.clamp(0.05 * through_origin, through_origin);
-        [((seconds - slope * work) / count).max(0.0), slope]
+        let fixed = [small, self.large].map(|seen| seen.seconds - slope * seen.work);
+        [fixed[0].min(fixed[1]).max(0.0), slope]
     }
 
     fn seconds(&self, level: &Level) -> f64 {
@@ -166,7 +197,7 @@ mod tests {
         assert!(levels[3].is_last && levels[3].size == JOB.0 && !levels[2].is_last);
         // One that renders the whole picture at once
         let mut fast = Speed::default();
-        for size in [100, 1000, 100, 1000, 100, 1000, 100, 1000] {
+        for size in [100, 1000] {
             let level = Level { size: [size; 2], samples: 2, is_last: false };
             fast.learn(&level, 1e-9 * level.work());
         }
@@ -190,14 +221,23 @@ mod tests {
         assert!(smaller.size[0] < level.size[0] / 2, "{smaller:?}");
         assert!(smaller.size[1] >= LEAST_SIDE);
         // A fast device with a fixed part: larger pictures cost nothing more
+        let time = |level: &Level| 0.05 + 1e-8 * level.work();
+        speed.learn(&whole(JOB.0), time(&whole(JOB.0)));
         for _ in 0..10 {
-            for level in [quick(whole(JOB.0), speed), whole(JOB.0)] {
-                speed.learn(&level, 0.05 + 1e-8 * level.work());
-            }
+            let level = quick(whole(JOB.0), speed);
+            speed.learn(&level, time(&level));
         }
         let [fixed, each] = speed.parts();
-        assert!((0.03..0.06).contains(&fixed) && each < 3e-8, "{fixed} {each}");
+        assert!((0.03..0.07).contains(&fixed) && each < 3e-8, "{fixed} {each}");
         assert!(quick(whole(JOB.0), speed).size[0] > 800);
+        // Particles that take ten times as long, of which no large picture was rendered
+        let time = |level: &Level| 1e-6 * level.work();
+        for _ in 0..20 {
+            let level = quick(whole(JOB.0), speed);
+            speed.learn(&level, time(&level));
+        }
+        let last = quick(whole(JOB.0), speed);
+        assert!((0.02..0.09).contains(&time(&last)), "{last:?}");
         // Pictures smaller than the least are rendered as they are
         assert_eq!(quick(whole([20, 10]), speed).size, [20, 10]);
     }
