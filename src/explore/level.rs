@@ -133,8 +133,10 @@ pub(super) fn next(
     is_moving: bool,
 ) -> Option<Level> {
     let last = Level { size, samples, is_last: true };
+    // A step to nearly all samples would take nearly the time of all
     let of = |samples: u32| {
-        if samples >= last.samples { last } else { Level { size, samples, is_last: false } }
+        let is_near = samples.saturating_mul(2) >= last.samples;
+        if is_near { last } else { Level { size, samples, is_last: false } }
     };
     let first = of(FIRST_SAMPLES);
     match done {
@@ -193,8 +195,8 @@ mod tests {
         assert!((20_000..25_000).contains(&(width * height)), "{levels:?}");
         assert!((f64::from(width) / f64::from(height) - 16.0 / 9.0).abs() < 0.02);
         let samples: Vec<u32> = levels.iter().map(|level| level.samples).collect();
-        assert_eq!(samples, [2, 2, 8, 16]);
-        assert!(levels[3].is_last && levels[3].size == JOB.0 && !levels[2].is_last);
+        assert_eq!(samples, [2, 2, 16]);
+        assert!(levels[2].is_last && levels[2].size == JOB.0 && !levels[1].is_last);
         // One that renders the whole picture at once
         let mut fast = Speed::default();
         for size in [100, 1000] {
