@@ -41,23 +41,25 @@ const OUTDATED: f64 = 3.0;
 
 /// The time of pictures of a page: a fixed part, and one for each sample of a pixel. They follow from a small picture and
 /// a large one; pictures of one size alone cannot tell the parts apart.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Speed {
     /// None until a picture was small beside the large one.
-    small: Option<Seen>,
-    large: Seen,
-    /// Whether the large one is a guess.
-    is_guess: bool,
+    small: Option<Timing>,
+    /// None until a picture was rendered.
+    large: Option<Timing>,
 }
+
+/// The large picture before one was rendered: that of one slow core.
+const GUESS: Timing = Timing { work: 1e5, seconds: 0.1 };
 
 /// The samples of a picture, all pixels together, and its seconds.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct Timing {
     work: f64,
     seconds: f64,
 }
 
-impl Seen {
+impl Timing {
     /// The mean of both if they are about as large, or else the newer one.
     fn then(self, newer: Self) -> Self {
         let ratio = newer.work / self.work;
@@ -69,45 +71,41 @@ impl Seen {
     }
 }
 
-impl Default for Speed {
-    /// That of one slow core, until a picture was rendered.
-    fn default() -> Self {
-        Self { small: None, large: Seen { work: 1e5, seconds: 0.1 }, is_guess: true }
-    }
-}
-
 impl Speed {
     /// Learns from a picture that took `seconds`.
     pub(super) fn learn(&mut self, level: &Level, seconds: f64) {
-        let seen = Seen { work: level.work(), seconds };
-        let ratio = seen.work / self.large.work;
-        if self.is_guess {
-            *self = Self { small: None, large: seen, is_guess: false };
-        } else if ratio > LARGE {
-            *self = Self { small: Some(self.large), large: seen, ..*self };
+        let newer = Timing { work: level.work(), seconds };
+        let Some(large) = self.large else {
+            self.large = Some(newer);
+            return;
+        };
+        let ratio = newer.work / large.work;
+        if ratio > LARGE {
+            *self = Self { small: Some(large), large: Some(newer) };
         } else if ratio * LARGE >= 1.0 {
-            self.large = self.large.then(seen);
+            self.large = Some(large.then(newer));
         } else {
-            let small = self.small.map_or(seen, |small| small.then(seen));
+            let small = self.small.map_or(newer, |small| small.then(newer));
             let is_outdated =
                 self.small.is_some() && small.seconds > OUTDATED * self.seconds(level);
             *self = if is_outdated {
-                Self { small: None, large: small, ..*self }
+                Self { small: None, large: Some(small) }
             } else {
-                Self { small: Some(small), ..*self }
+                Self { small: Some(small), large: Some(large) }
             };
         }
     }
 
     /// The fixed part, and that of a sample, seconds.
     fn parts(&self) -> [f64; 2] {
-        let Seen { work, seconds } = self.large;
+        let large = self.large.unwrap_or(GUESS);
+        let Timing { work, seconds } = large;
         let through_origin = seconds / work;
         let Some(small) = self.small else { return [0.0, through_origin] };
         // Neither is negative, whatever the noise
-        let slope = (seconds - small.seconds) / (work - small.work);
-        let slope = slope.clamp(0.05 * through_origin, through_origin);
-        let fixed = [small, self.large].map(|seen| seen.seconds - slope * seen.work);
+        let slope = ((seconds - small.seconds) / (work - small.work))
+            .clamp(0.05 * through_origin, through_origin);
+        let fixed = [small, large].map(|own| own.seconds - slope * own.work);
         [fixed[0].min(fixed[1]).max(0.0), slope]
     }
 

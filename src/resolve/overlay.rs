@@ -195,7 +195,7 @@ fn cover_particles(setup: &Setup, survey: &Survey) -> Vec<bool> {
 /// What is beside the picture on its page, linear RGB: the background if it has one colour, or else white.
 pub(super) fn paper(setup: &Setup) -> Vec3 {
     match setup.picture.scene.background {
-        Background::Constant(color) => setup.picture.files.preview.view.display(color),
+        Background::Constant(color) => setup.picture.files.preview.view.conversion()(color),
         _ => Vec3::ONE,
     }
 }
@@ -539,7 +539,7 @@ fn backdrop(setup: &Setup, camera: &Camera, film: Vec2) -> Vec3 {
             _ => scene.background.color_on_film(ray.direction, film),
         },
     };
-    picture.files.preview.view.display(color)
+    picture.files.preview.view.conversion()(color)
 }
 
 pub(super) fn srgb(linear: Vec3) -> Color {

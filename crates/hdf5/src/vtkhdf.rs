@@ -94,6 +94,11 @@ impl VtkHdf {
         Ok(Some(Self { node, kind, blocks, unread, step_count }))
     }
 
+    /// Whether the blocks are parts.
+    fn is_divided(&self) -> bool {
+        COMPOSITES.contains(&self.kind.as_str())
+    }
+
     /// Time of each step, by the file or by the first block that has them.
     fn times(&self, budget: MemoryBudget) -> Result<Vec<f64>, ParseError> {
         let own = self.node.group(STEPS)?;
@@ -301,7 +306,7 @@ fn value_offset(
     Ok(own.and_then(|own| u64::try_from(own).ok()))
 }
 
-/// Adds the values `name`, of which those of a step begin with `first`, if the file has them all.
+/// Adds the values `name` of a step, which begin at row `first`. They are left out if the file does not have all of them.
 fn add_values(
     finder: &mut PropertyFinder,
     data: &Node,
@@ -339,14 +344,13 @@ impl Dialect for VtkHdf {
         if step >= self.step_count {
             return Err(no_step(step, self.step_count));
         }
-        let is_divided = COMPOSITES.contains(&self.kind.as_str());
         let parts = (0..).zip(&self.blocks).map(|(value, block)| {
             let (part, _) = block.part(value, step, budget)?;
             Ok(part)
         });
         let parts = parts.collect::<Result<Vec<Part>, ParseError>>()?;
         let time = self.times(budget)?.get(step).copied();
-        Ok(ParticleTable::new(parts, is_divided).at(time, None))
+        Ok(ParticleTable::new(parts, self.is_divided()).at(time, None))
     }
 
     fn notes(&self) -> Vec<String> {
@@ -361,7 +365,7 @@ impl Dialect for VtkHdf {
             version.join("."),
             self.kind
         ))];
-        if COMPOSITES.contains(&self.kind.as_str()) {
+        if self.is_divided() {
             let names = self.blocks.iter().map(|block| block.name.as_str());
             notes.push(one_line(part_names((0..).zip(names))));
         }

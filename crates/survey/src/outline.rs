@@ -270,6 +270,9 @@ fn farthest(mut outliers: Vec<Outlier>, most: usize) -> Vec<usize> {
 
 /// The indices of `outliers`, rising, or none if the picture of the others would be hardly larger.
 fn worth_leaving_out(sample: &[DVec3], outliers: Vec<usize>) -> Vec<usize> {
+    if outliers.is_empty() {
+        return outliers;
+    }
     let mut left_out = outliers.iter().peekable();
     let (mut all, mut others) = (Extent::NONE, Extent::NONE);
     for (index, point) in sample.iter().enumerate() {

@@ -265,7 +265,7 @@ impl FrameFile {
         })
     }
 
-    /// The same file, of which the vertices of a mesh are particles if `are_particles`; otherwise a mesh is refused.
+    /// Reads the vertices of a mesh as particles if `are_particles`; otherwise, meshes are refused.
     #[must_use]
     pub fn with_mesh_points(mut self, are_particles: bool) -> Self {
         self.has_mesh_points = are_particles;

@@ -110,7 +110,7 @@ impl FileName {
         Some(piece)
     }
 
-    /// The path of the file `number` among those of one step, of which this is one.
+    /// The path of file `number` of the step to which this file belongs.
     pub(super) fn sibling_piece(&self, number: u64) -> Option<PathBuf> {
         self.piece?;
         let name = self.path.file_name()?.to_str()?;

@@ -48,7 +48,7 @@ impl IncompleteStep {
     }
 }
 
-/// The note on a step of which some files are used.
+/// The note about a step that is read from only some of its files.
 fn note(first: &Path, found: u64, stated: u64) -> String {
     let path = first.display();
     let used = if found == 1 { "is" } else { "are" };
@@ -107,8 +107,8 @@ fn follow_references(names: &mut Vec<FileName>, notes: &mut Vec<String>) {
     }
 }
 
-/// Finds names whose last number is that of a file of one step: the files state how many a step has. Notes steps of
-/// which only some files are used, and returns those of which files do not exist.
+/// Finds names whose last number is that of a file of one step: the files state how many a step has. Notes steps
+/// that are read from only some of their files, and returns steps with files that do not exist.
 fn split_pieces(names: &mut [FileName], notes: &mut Vec<String>) -> MissingPieces {
     // Ask the first file of each series how many files a step has
     let mut counts = BTreeMap::<Vec<String>, u64>::new();

@@ -131,6 +131,7 @@ impl SrgbPicture {
     /// The picture of `film` alone.
     pub(super) fn of_film(film: &Film, options: &PreviewOptions) -> Self {
         // Prepare buffers for a row
+        let display = options.view.conversion();
         let width = film.width.max(1) as usize;
         let is_transparent = options.background == PreviewBackground::Transparent;
         let pixel_len = if is_transparent { 4 } else { 3 };
@@ -147,7 +148,7 @@ impl SrgbPicture {
                     PreviewBackground::Transparent => straight(Vec3::new(r, g, b), a),
                     PreviewBackground::Color(color) => Vec3::new(r, g, b) + color * (1.0 - a),
                 };
-                *pixel = options.view.display(color).to_array();
+                *pixel = display(color).to_array();
             }
             // Round them with a pattern, which hides bands
             let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();

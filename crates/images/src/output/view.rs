@@ -16,9 +16,10 @@ pub struct DisplayView {
 }
 
 impl DisplayView {
-    /// Converts linear scene light to linear display light in 0 to 1.
-    pub fn display(&self, color: Vec3) -> Vec3 {
-        self.transform.display(color * exp2(self.exposure))
+    /// The conversion from linear scene light to linear display light in 0 to 1.
+    pub fn conversion(self) -> impl Fn(Vec3) -> Vec3 {
+        let gain = exp2(self.exposure);
+        move |color| self.transform.display(color * gain)
     }
 }
 
@@ -189,7 +190,7 @@ mod tests {
     use crate::math::{SimdLevel, Supported};
 
     fn view_transform(color: Vec3) -> Vec3 {
-        DisplayView::default().display(color)
+        DisplayView::default().conversion()(color)
     }
 
     #[test]

@@ -87,11 +87,12 @@ pub(super) fn picture(file: impl Read + Seek, view: DisplayView) -> Result<Pictu
     let (Some(red), Some(green), Some(blue)) = (floats("R"), floats("G"), floats("B")) else {
         return Err(Fault::Other("has no channels R, G and B".to_owned()));
     };
+    let display = view.conversion();
     let [width, height] = planes.size;
     let mut rgb = Vec::with_capacity(3 * red.len());
     for (y, row) in (0_u32..).zip(0..height) {
         for (x, i) in (0_u32..).zip(row * width..(row + 1) * width) {
-            let color = view.display(Vec3::new(red[i], green[i], blue[i]));
+            let color = display(Vec3::new(red[i], green[i], blue[i]));
             let threshold = dither_threshold(x, y);
             rgb.extend(color.to_array().map(|v| byte_from_linear(v, threshold)));
         }
