@@ -35,7 +35,6 @@ mod lights;
 mod meshes;
 mod opacity;
 mod overlay;
-mod parts;
 mod question;
 mod radius;
 mod rods;
@@ -159,7 +158,7 @@ fn setup_on(
         meshes: &inputs.grain_meshes,
         reach: extent.reach,
         bounds: extent.bounds,
-        priority: u8::from(styled.first.is_none()),
+        priority: u8::from(!styled.has_first),
     };
     let styles = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;
     // Collect the settings of the images

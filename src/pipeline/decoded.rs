@@ -10,11 +10,11 @@ use spherule_formats::{Attribute, AttributeData, Radius};
 
 use super::SharedFrame;
 use super::grains::{FrameGrains, grains_of};
-use super::load_error::{LoadError, missing, missing_value, no_parts};
+use super::load_error::{LoadError, missing, missing_value};
 use super::setup::{ColorRule, OpacityRule, ParticleRules, Setup};
 use super::styles::StyleRanges;
 use crate::scene::material::DEFAULT_COLOR;
-use crate::scene::{Camera, ColorMap, MaterialId, PartMaterials, RgbEncoding};
+use crate::scene::{Camera, ColorMap, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
 use spherule_frame::values::{Context, Value};
 
@@ -47,7 +47,7 @@ pub struct DecodedShading {
     pub ids: Option<Vec<u32>>,
     /// Velocities for the channels `V` and `motion`, and for motion blur until the tree is built.
     pub velocities: Option<Vec<Vec3>>,
-    /// The attribute that divides particles into parts, and their parts, for Cryptomatte and for materials.
+    /// The attribute that divides particles into parts, and their parts, for Cryptomatte.
     pub parts: Option<(String, Vec<i32>)>,
     /// The floats of attribute channels, one plane for each.
     pub attributes: Vec<Vec<f32>>,
@@ -79,7 +79,8 @@ impl<'a> DecodedFrame<'a> {
         // Extract ids and velocities for the channels
         let ids = if setup.picture.needs_ids() { ids(&frame) } else { None };
         let velocities = velocities_of(setup, &frame, file)?;
-        let parts = parts_of(setup, &frame, file)?;
+        let has_parts = setup.picture.render.channels.needs_parts();
+        let parts = part_of(&frame.attributes).filter(|_| has_parts).and_then(parts);
         // Extract the planes of attribute channels
         let mut planes = Vec::new();
         for channel in &setup.picture.files.attributes {
@@ -179,20 +180,6 @@ fn velocities_of(
         return Err(missing("velocity", purpose, file, has));
     }
     Ok(velocities)
-}
-
-/// The attribute with parts, and the parts, if they are needed.
-fn parts_of(
-    setup: &Setup,
-    frame: &SharedFrame<'_>,
-    file: &str,
-) -> Result<Option<(String, Vec<i32>)>, LoadError> {
-    let parts = if setup.needs_parts() { part_of(&frame.attributes).and_then(parts) } else { None };
-    if parts.is_none() && !setup.picture.scene.parts.is_empty() && !frame.is_empty() {
-        let has = frame.attributes.iter().map(|a| a.name.as_str());
-        return Err(no_parts(file, has));
-    }
-    Ok(parts)
 }
 
 impl DecodedFrame<'_> {
@@ -328,12 +315,6 @@ fn move_to_end<T: Copy>(items: &mut [T], chosen: &[u32]) {
 }
 
 impl DecodedShading {
-    /// Parts among `known` that no particle has.
-    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, MaterialId)> {
-        let parts = self.parts.iter();
-        known.absent(parts.flat_map(|(_, parts)| parts.iter().copied()))
-    }
-
     /// Whether particles have individual colours.
     pub fn has_colors(&self) -> bool {
         !self.values.is_empty() || !self.colors.is_empty()

@@ -170,7 +170,6 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::LightExtent | Missing::Lights => "light",
         Missing::Layers => "output.channels",
         Missing::Drawing => "render.outline",
-        Missing::Parts => "material.part",
         Missing::Holdout => "mesh",
         Missing::Detail => "environment.detail",
         Missing::Clamp => "render.clamp",

@@ -10,20 +10,17 @@ use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ScalarType, SimulationCell, is_radius};
 
 use super::facts::{FileFacts, column_range};
-use super::load_error::{LoadError, missing, missing_value, no_parts};
+use super::load_error::{LoadError, missing, missing_value};
 use super::setup::{ColorRule, OpacityRule, Picture, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean, opacity_of};
-use crate::scene::{ColorMap, MaterialId, PartMaterials, RgbEncoding};
+use crate::scene::{ColorMap, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
 use spherule_frame::values::{Context, Named, Value};
 
 /// In frames up to this size (bytes), all data in use are verified with their checksums before tracing. In larger
 /// frames only the nodes are, which are read anyway; rays touch little of the rest.
 const MAX_VERIFIED: u64 = 1 << 30;
-
-/// Parts are searched in frames of up to so many particles.
-const MAX_SEARCHED: usize = 1 << 26;
 
 /// An open native frame.
 #[derive(Debug)]
@@ -167,22 +164,6 @@ impl StoredFrame {
         }
     }
 
-    /// Parts among `known` that no particle has. Empty for large frames: the search reads all particles, and rendering
-    /// reads only those that are visible.
-    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, MaterialId)> {
-        let frame = self.frame();
-        let name = self.names.parts.as_deref();
-        let Some(parts) = name.and_then(|name| frame.attribute(name)) else {
-            return Vec::new();
-        };
-        let count = usize::try_from(self.particles()).unwrap_or(usize::MAX);
-        if count > MAX_SEARCHED {
-            return Vec::new();
-        }
-        let parts = (0..count).map_while(|index| parts.low_bits(index));
-        known.absent(parts.map(u32::cast_signed))
-    }
-
     /// What overlays show of the frame; `file` is the name of its file.
     pub(super) fn facts(&self, setup: &Setup, file: String) -> FileFacts {
         let names = setup.picture.files.overlay_values.iter();
@@ -295,7 +276,7 @@ impl Names {
                 id_of(&attributes).filter(|a| channels.needs_ids() && a.low_bits(0).is_some()),
             ),
             velocities: name(velocity_of(&attributes).filter(|_| channels.needs_velocities())),
-            parts: parts_for(setup, &attributes, file)?,
+            parts: name(part_of(&attributes).filter(|_| channels.needs_parts())),
             channels: with_channels,
         })
     }
@@ -342,24 +323,6 @@ impl<'a> Columns<'a> {
         }
         Ok(found)
     }
-}
-
-/// The attribute with the parts of particles, if it is needed.
-fn parts_for(
-    setup: &Setup,
-    attributes: &[AttributeView<'_>],
-    file: &NativeFile,
-) -> Result<Option<String>, LoadError> {
-    if !setup.needs_parts() {
-        return Ok(None);
-    }
-    let found = part_of(attributes).map(|a| a.name().to_owned());
-    let is_required = !setup.picture.scene.parts.is_empty() && file.index().count > 0;
-    if found.is_none() && is_required {
-        let path = file.path().display().to_string();
-        return Err(no_parts(&path, attributes.iter().map(Named::name)));
-    }
-    Ok(found)
 }
 
 /// Radii of a frame that is traced in place.

@@ -27,7 +27,6 @@ use super::styles::{StyleRanges, in_order_of_styles};
 use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
 use crate::overlay::Overlay;
-use crate::scene::Owner;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -297,7 +296,6 @@ impl LoadedFrame<'_> {
             self.clamped_radii,
             "with a raised radius: it was too small to be seen, or no number",
         );
-        self.note_absent_parts(setup);
         self.note_absent_styles(setup);
         self.notes.extend(missing_glyphs(setup));
         self.meshes = meshes_of(
@@ -307,25 +305,6 @@ impl LoadedFrame<'_> {
             &mut self.notes,
         )?;
         Ok(())
-    }
-
-    /// Notes parts with a material of their own that no particle has.
-    fn note_absent_parts(&mut self, setup: &Setup) {
-        let known = &setup.picture.scene.parts;
-        let absent = match &self.particles {
-            _ if known.is_empty() || self.particles.count() == 0 => return,
-            LoadedParticles::Decoded(frame) => frame.shading.absent_parts(known),
-            LoadedParticles::Stored(frame) => frame.absent_parts(known),
-        };
-        for (part, material) in absent {
-            let Owner::Part(number) = setup.picture.scene.material(material).owner else {
-                continue;
-            };
-            self.notes.push(format!(
-                "frame {}: no particle is of part {part}, which material.part.{number} names",
-                self.task.frame
-            ));
-        }
     }
 
     /// Notes styles that no particle has.

@@ -86,17 +86,6 @@ pub enum LoadError {
         /// The fault.
         fault: GrainColumnError,
     },
-    /// It lacks the parts that materials are for.
-    #[error(
-        "{file}: no attribute with the parts of particles for material.part: it needs integers called `part`, \
-         `type` or `phase`; it has {has}"
-    )]
-    NoParts {
-        /// The frame's first file.
-        file: String,
-        /// The attributes of the frame.
-        has: String,
-    },
     /// Its particles are so near each other that there are too many bonds.
     #[error(
         "{file}: bonds.find gives more than 8 bonds for each of {particles} particles, on average; take a shorter \
@@ -170,11 +159,6 @@ pub(super) fn unknown_name(
             attribute_list(names.iter().map(String::as_str))
         },
     }
-}
-
-/// The error for a frame that `has` only attributes that are no parts.
-pub(super) fn no_parts<'a>(file: &str, has: impl Iterator<Item = &'a str>) -> LoadError {
-    LoadError::NoParts { file: file.to_owned(), has: attribute_list(has) }
 }
 
 /// A list of names for a message.

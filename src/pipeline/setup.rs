@@ -297,6 +297,8 @@ pub struct ParticleStyle {
     pub is_named: bool,
     /// Whether it is that of particles without a style, beside a clear one.
     pub is_of_rest: bool,
+    /// Whether they have one scale of colours with the particles without a style.
+    pub shares_colors: bool,
     /// What stands for them.
     pub form: StyleForm,
     /// Source of the radii.
@@ -496,11 +498,6 @@ impl Setup {
         }
     }
 
-    /// Whether the parts of particles are needed, for channels or for their materials.
-    pub(super) fn needs_parts(&self) -> bool {
-        self.picture.render.channels.needs_parts() || !self.picture.scene.parts.is_empty()
-    }
-
     /// Whether the indices of particles at intersections are needed, with or without values for colours.
     pub(super) fn needs_indices(&self, has_values: bool) -> bool {
         self.needs_particles() || has_values
@@ -512,7 +509,7 @@ impl Setup {
         let is_for_channels = picture.render.channels.needs_particles();
         let rules = &picture.particles;
         let is_for_look = rules.opacity.is_by_particle() || !rules.styles.is_empty();
-        is_for_channels || is_for_look || self.needs_parts()
+        is_for_channels || is_for_look || picture.render.channels.needs_parts()
     }
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.

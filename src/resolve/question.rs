@@ -4,7 +4,7 @@ use crate::math::narrow;
 use glam::DVec3;
 
 use super::{camera, color, overlay};
-use crate::manifest::{ColorSetting, Manifest, RadiusSetting, Style, StyledManifest};
+use crate::manifest::{ColorSetting, DrawnStyle, Manifest, RadiusSetting, StyledManifest};
 use crate::selection::Selection;
 use crate::surface::SurfaceKind;
 use crate::survey::{Question, RadiusQuestion, StyleQuestions, SurfaceQuestion};
@@ -14,28 +14,23 @@ use crate::survey::{Question, RadiusQuestion, StyleQuestions, SurfaceQuestion};
 pub struct Inquiry {
     styled: StyledManifest,
     selection: Selection,
-    /// The colours of the styles, where these have the usual ones too.
-    colors: Vec<ColorSetting>,
 }
 
 impl Inquiry {
     /// What a job of `manifest` needs to know.
     pub fn of(manifest: &Manifest) -> Self {
-        let styled = manifest.styled();
-        let usual = &styled.manifest.material.color;
-        Self {
-            selection: manifest.selection(),
-            colors: styled.styles.iter().map(|style| style.colors(usual)).collect(),
-            styled,
-        }
+        Self { styled: manifest.styled(), selection: manifest.selection() }
     }
 
     /// The colours of the styles as questions, if there are styles.
     pub fn styles(&self) -> Option<StyleQuestions<'_>> {
         let division = &self.styled.division;
+        let own = |drawn: &DrawnStyle| !drawn.shares_colors;
         (!division.is_one()).then(|| StyleQuestions {
             division: division.clone(),
-            colors: self.colors.iter().map(color::question).collect(),
+            colors: (self.styled.styles.iter())
+                .map(|drawn| own(drawn).then(|| color::question(&drawn.style.color)))
+                .collect(),
         })
     }
 
@@ -43,7 +38,7 @@ impl Inquiry {
     pub fn question<'a>(&'a self, styles: Option<&'a StyleQuestions<'a>>) -> Question<'a> {
         let (manifest, selection) = (&self.styled.manifest, &self.selection);
         let has_body = manifest.surface.kind != SurfaceKind::Spheres
-            || self.styled.styles.iter().any(Style::is_body);
+            || self.styled.styles.iter().any(|drawn| drawn.style.is_body());
         let needs_points = |setting: &ColorSetting| color::is_depth(setting);
         // Ask only for what the manifest leaves open: each answer takes time
         Question {
@@ -63,7 +58,7 @@ impl Inquiry {
             up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
             selection: Some(selection).filter(|s| !s.is_all() || !s.cuts.is_empty()),
             points: needs_points(&manifest.material.color)
-                || self.colors.iter().any(needs_points)
+                || self.styled.styles.iter().any(|drawn| needs_points(&drawn.style.color))
                 || overlay::needs_points(manifest),
             fit: camera::fit(manifest),
             framed: None,

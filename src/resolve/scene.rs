@@ -5,16 +5,16 @@ use glam::Vec3;
 use super::camera::PlacedCamera;
 use super::environment::{Surroundings, surroundings};
 use super::ground::GroundPlace;
-use super::{Extent, ResolveError, SceneInputs, ground, lights, parts, surface};
+use super::{Extent, ResolveError, SceneInputs, ground, lights, surface};
 use crate::manifest::Manifest;
 use crate::render::IntegratorKind;
-use crate::scene::{Background, DEFAULT_AMBIENT_LIGHT, PartMaterials, Scene, default_lights};
+use crate::scene::{Background, DEFAULT_AMBIENT_LIGHT, Scene, default_lights};
 use crate::survey::Survey;
 
 /// The scene at the start of the camera path.
 ///
 /// # Errors
-/// Light is not possible with the other settings, or the particles have no parts.
+/// Light is not possible with the other settings.
 pub(super) fn scene(
     manifest: &Manifest,
     survey: &Survey,
@@ -48,7 +48,6 @@ pub(super) fn scene(
         lights,
         ambient_light: DEFAULT_AMBIENT_LIGHT,
         materials: Scene::basic_materials(surface::material(manifest, bounds)),
-        parts: PartMaterials::default(),
         background: background(manifest, up.as_vec3()),
         ground: ground::ground(manifest, &place),
         wet_ground: ground::wet_ground(manifest, &place),
@@ -60,7 +59,6 @@ pub(super) fn scene(
         exposure: None,
     };
     scene.set_spray_soft(manifest.draws_soft_spray());
-    parts::add(&mut scene, manifest, survey)?;
     Ok(scene)
 }
 

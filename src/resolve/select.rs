@@ -7,7 +7,7 @@ use crate::pipeline::attribute_list;
 use crate::selection::{Condition, NameFault, Selection};
 use crate::surface::SurfaceKind;
 use crate::surface::cut::ConvexRegion;
-use crate::survey::Survey;
+use crate::survey::{PART_NAMES, Survey};
 use spherule_frame::values::{Value, value_names};
 
 /// The selection of `manifest`.
@@ -30,7 +30,25 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
             check_names(&of(condition), survey, &format!("style.{number}.where"))?;
         }
     }
+    check_parts(manifest, survey)?;
     Ok(Selection { up, ..manifest.selection() })
+}
+
+/// Checks that an attribute divides the particles into parts, if parts have materials.
+fn check_parts(manifest: &Manifest, survey: &Survey) -> Result<(), ResolveError> {
+    let known = color::known_attributes(survey);
+    if manifest.material.parts.is_empty()
+        || survey.most_particles == 0
+        || Value::named(PART_NAMES[0], &known).is_some()
+    {
+        return Ok(());
+    }
+    let names = PART_NAMES.map(|name| format!("`{name}`")).join(", ");
+    let what = format!(
+        "no attribute says which part a particle is of: it would be called one of {names}; available: {}",
+        attribute_list(survey.attributes.iter().map(String::as_str))
+    );
+    Err(ResolveError::Unsupported { key: "material.part", what })
 }
 
 /// Checks that the particles have the values that `selection` names; `key` is that of its condition.

@@ -6,8 +6,8 @@ use super::bonds::bond_rule;
 use super::rods::look;
 use super::{ResolveError, arrows, color, opacity, radius, surface};
 use crate::manifest::{
-    BondSearch, ColorSetting, GrainNumbers, Manifest, RadiusSetting, Style, StyleDraw,
-    StyleMaterial,
+    BondSearch, ColorSetting, DrawnStyle, GrainNumbers, Manifest, RadiusSetting, Style, StyleDraw,
+    StyleMaterial, StyleSource,
 };
 use crate::math::narrow;
 use crate::pipeline::{
@@ -50,18 +50,23 @@ impl Looks<'_> {
     pub(super) fn styles(
         &self,
         scene: &mut Scene,
-        styles: &[Style],
+        styles: &[DrawnStyle],
         (arrows, trails): (&mut Vec<ArrowStyle>, &mut Vec<TrailStyle>),
     ) -> Result<Vec<ParticleStyle>, ResolveError> {
         let mut looks = Vec::new();
-        for (index, style) in styles.iter().enumerate() {
+        for (index, drawn) in styles.iter().enumerate() {
+            let style = &drawn.style;
             // The manifest has no more of them than there are materials
-            let Some(material) = scene.add_style(self.material(style)) else {
+            let material = self.material(style);
+            let added = match drawn.source {
+                StyleSource::Part(_) => scene.add_part(material),
+                StyleSource::Style(_) | StyleSource::Rest => scene.add_style(material),
+            };
+            let Some(material) = added else {
                 break;
             };
-            let setting = style.colors(&self.manifest.material.color);
             let range = self.survey.styles.get(index).and_then(Option::as_ref);
-            let color = color::rule(&setting, range, self.survey, Some(self.camera))?;
+            let color = color::rule(&style.color, range, self.survey, Some(self.camera))?;
             let (radius, radius_factor) = self.radius(style)?;
             let bonds = if style.has_sticks() {
                 self.bonds(scene, style, &color, (&radius, radius_factor))?
@@ -76,9 +81,10 @@ impl Looks<'_> {
                 trails.extend(own.into_iter().map(|own| TrailStyle { style: Some(index), ..own }));
             }
             looks.push(ParticleStyle {
-                name: style.title(),
+                name: drawn.title(),
                 is_named: style.name.is_some() && !style.is_clear(),
                 is_of_rest: style.condition.is_none() && style.name.is_none(),
+                shares_colors: drawn.shares_colors,
                 form: self.form(style),
                 radius,
                 radius_factor,
@@ -102,7 +108,7 @@ impl Looks<'_> {
                 let found = surface::optics(&settings, kind, &self.bounds);
                 Material { priority: self.priority, ..found }
             }
-            Some(own) => own.resolved(&style.colors(&self.manifest.material.color)),
+            Some(own) => own.resolved(&style.color),
             None if usual.transmission == 0.0 => usual,
             None => StyleMaterial::default().resolved(&style.color),
         }

@@ -83,7 +83,7 @@ fn images_do_not_depend_on_how_particles_are_traced() {
         for (number, way) in ways.iter().enumerate() {
             let out = format!("{input}-{number}");
             let ran = render(&workshop, input, &out, way).expect(0);
-            assert!(!ran.errors().contains("no particle is of part"));
+            assert!(!ran.errors().contains("no particle is of style"));
             let made = images(&workshop.join(&out));
             assert!(!made.is_empty());
             let made: Vec<_> = made.into_values().collect();
@@ -127,8 +127,8 @@ fn cryptomatte_names_the_materials_of_parts() {
 #[test]
 fn absent_parts_are_reported_and_missing_attributes_refused() {
     let workshop = particles(1);
-    job(&workshop, &format!("{PARTS}[[material.part]]\nparts = [1, 77]\n"));
-    let absent = "frame 1: no particle is of part 77, which material.part.2 names";
+    job(&workshop, &format!("{PARTS}[[material.part]]\nparts = [76, 77]\n"));
+    let absent = "frame 1: no particle is of style `material.part.2`";
     let ran = render(&workshop, "in", "absent", &[]).expect(0);
     assert!(ran.errors().contains(absent), "{}", ran.errors());
     workshop.run(&["convert", "in", "-o", "native"]).expect(0);
@@ -150,10 +150,10 @@ fn absent_parts_are_reported_and_missing_attributes_refused() {
     let ran = render(&workshop, "plain", "none", &[]).expect(2);
     let message = "no attribute says which part a particle is of: it would be called one of `part`, `type`, `phase`";
     assert!(ran.errors().contains(message), "{}", ran.errors());
-    // Fractions are no parts, which only a frame shows
-    fs::write(workshop.join("plain/f_1.csv"), "x,y,z,type\n1,2,3,4.5\n2,3,4,5\n").expect("a file");
-    let ran = render(&workshop, "plain", "fractions", &[]).expect(1);
-    let message = "no attribute with the parts of particles for material.part";
+    // Fractions are no parts
+    fs::write(workshop.join("plain/f_1.csv"), "x,y,z,type\n1,2,3,2.5\n2,3,4,3\n").expect("a file");
+    let ran = render(&workshop, "plain", "fractions", &[]).expect(0);
+    let message = "no particle is of style `material.part.0`";
     assert!(ran.errors().contains(message), "{}", ran.errors());
 }
 

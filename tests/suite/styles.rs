@@ -49,6 +49,16 @@ fn native_frames_have_the_same_styles() {
 }
 
 #[test]
+fn styles_share_the_scale_of_colors_without_a_style() {
+    let workshop = layers();
+    let by_speed = ["a.png", "--color-by", "vx", "--style", "y > 3.5: spheres, radius 0.3"];
+    let ran = still(&workshop, "in", &by_speed).expect(0).prints("colour by `vx`, range 0 to 7");
+    assert!(!ran.errors().contains("style `y > 3.5`: colour"), "{}", ran.errors());
+    let own = ["b.png", "--color-by", "vx", "--style", "y > 3.5: spheres, color_by vx"];
+    still(&workshop, "in", &own).expect(0).prints("style `y > 3.5`: colour by `vx`, range 4 to 7");
+}
+
+#[test]
 fn styles_are_settings_of_a_job() {
     let workshop = layers();
     let style = ["--style", "type == 2: spheres, color red"];

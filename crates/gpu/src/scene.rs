@@ -46,8 +46,6 @@ pub enum Missing {
     LightExtent,
     /// More lights than [`MAX_LIGHTS`].
     Lights,
-    /// Materials of parts.
-    Parts,
     /// Channels that are not from the nearest sample.
     Layers,
     /// Outlines and the fading with distance.
@@ -73,7 +71,6 @@ impl fmt::Display for Missing {
             Self::Panorama => "equirectangular pictures",
             Self::LightExtent => "lights with an extent in Whitted's model",
             Self::Lights => "more than eight lights",
-            Self::Parts => "materials of parts",
             Self::Layers => "layers of light and Cryptomatte",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
@@ -104,7 +101,6 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (camera.projection().is_panorama(), Missing::Panorama),
         (scene.lights.iter().any(has_extent) && is_whitted, Missing::LightExtent),
         (scene.lights.len() > MAX_LIGHTS, Missing::Lights),
-        (!scene.parts.is_empty() && !is_whitted, Missing::Parts),
         (!are_from_nearest(&settings.channels), Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),

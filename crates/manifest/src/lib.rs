@@ -102,6 +102,7 @@ mod schema;
 mod select;
 mod source;
 mod style;
+mod styled;
 mod sun;
 mod surface;
 #[cfg(test)]
@@ -158,7 +159,8 @@ pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use source::ManifestSource;
 pub use spherule_tracer::render::NamedChannel;
-pub use style::{Style, StyleBonds, StyleDraw, StyleMaterial, StyleMaterialKind, StyledManifest};
+pub use style::{Style, StyleBonds, StyleDraw, StyleMaterial, StyleMaterialKind};
+pub use styled::{DrawnStyle, StyleSource, StyledManifest};
 pub use sun::Sun;
 pub use text_size::{TextSize, points_on_paper};
 pub use trails::Trails;

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 use serde_json::{Value as Json, json};
-use spherule_tracer::scene::{Finish, Material};
 
 use super::field::Field;
 use super::key::{Affects, Key};
@@ -94,20 +93,6 @@ impl Part {
             }
         }
     }
-
-    /// The material in a scene.
-    pub fn resolved(&self) -> Material {
-        let roughness = self.roughness;
-        Material {
-            finish: match self.kind {
-                PartKind::Matte => Finish::Matte,
-                PartKind::Plastic => Finish::Plastic { roughness },
-                PartKind::Metal => Finish::Metal { roughness },
-            },
-            color: self.color,
-            ..Material::DEFAULT
-        }
-    }
 }
 
 /// At least one integer.
@@ -156,9 +141,8 @@ mod tests {
         let parts = read(text).unwrap();
         assert_eq!(parts[0], Part::default());
         assert_eq!(parts[1].parts, [-2, 5]);
-        let found = parts[1].resolved();
-        assert_eq!(found.finish, Finish::Metal { roughness: 0.2 });
-        assert_eq!(found.color, Some(Vec3::new(1.0, 0.0, 0.5)));
+        assert_eq!((parts[1].kind, parts[1].roughness), (PartKind::Metal, 0.2));
+        assert_eq!(parts[1].color, Some(Vec3::new(1.0, 0.0, 0.5)));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `[[style]]`: how some of the particles are drawn, unlike the others.
 
 use spherule_frame::grain_columns::{GrainNames, SizeKind};
-use spherule_selection::{Claim, Condition, Division};
+use spherule_selection::Condition;
 use spherule_surface::SurfaceKind;
 use spherule_tracer::scene::{self, Finish, Fresnel};
 
@@ -475,30 +475,6 @@ impl Style {
     }
 }
 
-/// Styles as they are drawn. If any particles are clear, the first group is: the particles without a style if these are,
-/// else those of the first clear style; see [`Manifest::styled`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct StyledManifest {
-    /// The settings, with `[material]`, `[surface]`, `input.radius` and `[bonds]` of the first group.
-    pub manifest: Manifest,
-    /// The styles of the other groups, in the order of these.
-    pub styles: Vec<Style>,
-    /// Which particles belong to which group. The claims are in the order of the manifest's styles, without hidden ones.
-    pub division: Division,
-    /// The style of the manifest that has become the first group, if one has.
-    pub first: Option<usize>,
-}
-
-/// The order of groups by what they draw: spheres, bodies, others.
-fn rank(style: &Style) -> u8 {
-    match style.surface() {
-        _ if style.draw == StyleDraw::Grains => 1,
-        Some(SurfaceKind::Spheres) => 0,
-        Some(SurfaceKind::Union | SurfaceKind::Smooth) => 1,
-        None => 2,
-    }
-}
-
 impl Manifest {
     /// The condition of the particles that no hidden style takes; None if all are drawn.
     pub(super) fn shown_condition(&self) -> Option<Condition> {
@@ -525,87 +501,6 @@ impl Manifest {
             };
         }
         if is_none { Some(nothing()) } else { rest }
-    }
-
-    /// The groups of particles that are drawn in different ways: first those without a style, or those of the first clear
-    /// style if the others are opaque.
-    pub fn styled(&self) -> StyledManifest {
-        let drawn: Vec<(usize, &Style)> = (self.styles.iter().enumerate())
-            .filter(|(_, style)| style.draw != StyleDraw::Hidden)
-            .collect();
-        let first_clear = drawn.iter().find(|(_, style)| style.is_clear());
-        let first = first_clear.filter(|_| !self.material.is_clear()).map(|(index, _)| *index);
-        // The settings without a style are one of the other groups if a style takes their place
-        let mut others: Vec<(Option<usize>, Style)> = (drawn.iter())
-            .filter(|(index, _)| Some(*index) != first)
-            .map(|(index, style)| (Some(*index), (*style).clone()))
-            .collect();
-        let has_rest = drawn.iter().all(|(_, style)| style.condition.is_some());
-        if first.is_some() && has_rest {
-            others.push((None, self.style_of_rest()));
-        }
-        others.sort_by_key(|(_, style)| rank(style));
-        let group_of = |index: Option<usize>| {
-            let place = others.iter().position(|(other, _)| *other == index);
-            place.map_or(0, |place| place + 1)
-        };
-        let mut claims: Vec<Claim> = (drawn.iter())
-            .map(|(index, style)| Claim {
-                condition: style.condition.clone(),
-                group: group_of(Some(*index)),
-            })
-            .collect();
-        if first.is_some() && has_rest {
-            claims.push(Claim { condition: None, group: group_of(None) });
-        }
-        let mut manifest = self.clone();
-        if let Some(first) = first {
-            manifest.take_style(&self.styles[first]);
-        }
-        let division = Division { claims, groups: others.len() + 1, up: None };
-        let styles = others.into_iter().map(|(_, style)| style).collect();
-        StyledManifest { manifest, styles, division, first }
-    }
-
-    /// The settings of particles without a style, as a style.
-    fn style_of_rest(&self) -> Style {
-        let kind = match self.material.kind {
-            Some(MaterialKind::Plastic) => StyleMaterialKind::Plastic,
-            Some(MaterialKind::Metal) => StyleMaterialKind::Metal,
-            _ => StyleMaterialKind::Matte,
-        };
-        let roughness = Some(self.material.roughness);
-        Style {
-            draw: match self.surface.kind {
-                SurfaceKind::Spheres => StyleDraw::Spheres,
-                SurfaceKind::Union => StyleDraw::Union,
-                SurfaceKind::Smooth => StyleDraw::Smooth,
-            },
-            radius: self.input.radius.clone(),
-            color: self.material.color.clone(),
-            opacity: self.material.opacity.clone(),
-            material: Some(StyleMaterial { kind, roughness, ..StyleMaterial::default() }),
-            ..Style::default()
-        }
-    }
-
-    /// Draws the particles without a style like those of `style`.
-    fn take_style(&mut self, style: &Style) {
-        let color = style.colors(&self.material.color);
-        if let Some(kind) = style.surface() {
-            self.surface.kind = kind;
-        }
-        if style.radius != RadiusSetting::Auto {
-            self.input.radius = style.radius.clone();
-        }
-        self.bonds.find = BondSearch::None;
-        let usual = std::mem::take(&mut self.material);
-        self.material = match &style.material {
-            None => usual,
-            Some(own) => own.as_material(&usual, usual.constants.ior),
-        };
-        self.material.color = color;
-        self.material.opacity = style.opacity.clone();
     }
 }
 

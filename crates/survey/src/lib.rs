@@ -254,8 +254,8 @@ impl Question<'_> {
 pub struct StyleQuestions<'a> {
     /// Which particles have which style, by its index and 1.
     pub division: Division,
-    /// The colours of each style.
-    pub colors: Vec<ColorQuestion<'a>>,
+    /// The colours of each style; None: those of the particles without one, whose range is that of both.
+    pub colors: Vec<Option<ColorQuestion<'a>>>,
 }
 
 /// What a job needs to know about radii.

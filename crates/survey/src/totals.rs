@@ -141,12 +141,15 @@ impl Totals {
             None => self.color.add(velocity, question.color, context),
             Some((groups, styles)) => {
                 self.styles.resize_with(styles.colors.len(), ColorTotals::default);
-                let questions = std::iter::once(&question.color).chain(&styles.colors);
+                let usual = Some(question.color);
+                let questions = std::iter::once(&usual).chain(&styles.colors);
                 let totals = std::iter::once(&mut self.color).chain(&mut self.styles);
                 for ((question, total), raw) in questions.zip(totals).zip(groups) {
                     let frame = &ParticleFrame::from_raw(raw, origin);
                     total.was_empty |= frame.is_empty();
-                    total.add(velocity, *question, FrameContext { frame, ..context });
+                    if let Some(question) = question {
+                        total.add(velocity, *question, FrameContext { frame, ..context });
+                    }
                 }
             }
         }
@@ -297,7 +300,12 @@ impl Totals {
         let rgb = rgb_colors(self.rgb, color.as_ref());
         let questions = question.styles.map(|styles| &styles.colors[..]).unwrap_or_default();
         let styles = self.styles.into_iter().zip(questions);
-        let styles = styles.map(|(total, question)| total.finish(*question)).collect();
+        let finished = |(total, question): (ColorTotals, &Option<ColorQuestion<'_>>)| match question
+        {
+            Some(question) => total.finish(*question),
+            None => color.clone(),
+        };
+        let styles = styles.map(finished).collect();
         // Use the origin of native frames: with a different one, they could not be traced in place.
         let origin = match self.origin {
             Origins::Shared(origin) => origin,
@@ -345,21 +353,31 @@ impl Totals {
     }
 }
 
-/// The particles of `raw` in groups: those without a style, and those of each. Of names without a value, which are
-/// reported later, there are no groups.
+/// The particles of `raw` in groups: those without a style, with those of styles that share their colours, and those of
+/// each. Of names without a value, which are reported later, there are no groups.
 fn groups_of(styles: &StyleQuestions<'_>, raw: &RawParticles, up: DVec3) -> Vec<RawParticles> {
     let division = Division { up: Some(up), ..styles.division.clone() };
     let all: Vec<u32> = (0..index_u32(raw.positions.len())).collect();
     let Ok(divided) = division.divide(raw, &all) else {
         return Vec::new();
     };
-    let mut start = 0;
-    let group = |end: &usize| {
+    let of = |indices: &[u32]| {
         let mut group = raw.clone();
-        group.select(&divided.order[std::mem::replace(&mut start, *end)..*end]);
+        group.select(indices);
         group
     };
-    divided.ends.iter().map(group).collect()
+    let mut first = divided.order[..divided.ends[0]].to_vec();
+    let mut groups = vec![RawParticles::default()];
+    for (ends, color) in divided.ends.windows(2).zip(&styles.colors) {
+        let own = &divided.order[ends[0]..ends[1]];
+        groups.push(of(own));
+        if color.is_none() {
+            first.extend(own);
+        }
+    }
+    first.sort_unstable();
+    groups[0] = of(&first);
+    groups
 }
 
 /// The colours of the attribute `rgb`, unless the range of another attribute was found: speed has precedence.

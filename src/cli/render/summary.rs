@@ -74,7 +74,8 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(text) = color_text(setup, survey) {
         message!("{text}");
     }
-    for style in &setup.picture.particles.styles {
+    let styles = setup.picture.particles.styles.iter();
+    for style in styles.filter(|style| !style.shares_colors) {
         if let Some(text) = map_text(&style.color) {
             message!("style `{}`: {text}", style.name);
         }

@@ -169,7 +169,7 @@ impl MemoryModel<'_> {
             (ids, 4),
             (channels.needs_velocities() && self.has_velocities, 12),
             // Whether there are parts is not known in advance
-            (self.setup.needs_parts(), 4),
+            (self.setup.picture.render.channels.needs_parts(), 4),
             (true, 4 * u64::from(channels.layers.attributes)),
         ];
         let each: u64 = parts.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();

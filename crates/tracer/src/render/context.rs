@@ -18,8 +18,8 @@ use super::{
     source::ShadeSource,
     stream::SegmentPacket,
 };
-use crate::scene::{Camera, PartMaterials, Scene};
-use spherule_surface::{MaterialId, Shape, Side};
+use crate::scene::{Camera, Scene};
+use spherule_surface::{Shape, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::Supported;
 
@@ -29,8 +29,6 @@ const MIN_SAMPLE_WIDTH: f32 = 0.125;
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
     pub(super) shapes: SceneShapes<'a>,
-    /// Materials of parts of the particles, if these are separate spheres and paths are traced.
-    pub(super) parts: Option<&'a PartMaterials>,
     /// Whether some of the particles have a style with a material of its own.
     pub(super) has_styles: bool,
     /// Whether there are meshes that only hide what is behind them.
@@ -90,7 +88,6 @@ impl<'a> RenderContext<'a> {
         settings: &'a RenderSettings,
     ) -> Self {
         let shapes = SceneShapes::new(shapes, scene, source, settings.integrator);
-        let is_connected = shapes.connected_particles().is_some();
         let eye = scene.camera.eye();
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         let is_body = shapes.interior == Interior::Body;
@@ -100,9 +97,6 @@ impl<'a> RenderContext<'a> {
             camera_bodies: nested.map(|nested| nested.at(eye)).unwrap_or_default(),
             is_camera_inside: is_body && shapes.particles.is_some_and(contains_eye),
             shapes,
-            parts: Some(&scene.parts)
-                .filter(|parts| !parts.is_empty() && !is_connected)
-                .filter(|_| settings.integrator == IntegratorKind::Path),
             has_styles: source.has_styles(),
             has_holdouts: scene.materials.iter().any(|material| material.is_holdout),
             source,
@@ -119,13 +113,6 @@ impl<'a> RenderContext<'a> {
             sampler: FilmSampler::with_filter(settings.samples, settings.filter, settings.seed),
             max_segments: SEGMENTS,
         }
-    }
-
-    /// The material of `particle`.
-    #[inline]
-    pub(super) fn material_of(&self, parts: &PartMaterials, particle: u32) -> MaterialId {
-        let part = self.source.part(particle);
-        part.and_then(|(_, part)| parts.of(part)).unwrap_or(MaterialId::PARTICLES)
     }
 
     /// The index of refraction of the medium in which the ray in `lane` of `segments` is, relative to air.

@@ -13,7 +13,7 @@ use super::{
     stream::SegmentPacket,
 };
 use crate::scene::material::extinction;
-use crate::scene::{Background, Material, Owner};
+use crate::scene::{Background, Material};
 use spherule_surface::{Intersections, MaterialId};
 use spherule_tree::math::{Lanes3, lanes_in, splat};
 
@@ -52,23 +52,18 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Replaces the material of particles by that of their part or style.
+    /// Replaces the material of particles by that of their style.
     fn assign_materials(&self, packet: &mut PacketScratch) {
-        let hits = &mut packet.hits;
-        if self.has_styles {
-            // Spheres of several styles are one shape, which has the material of one of them
-            for lane in lanes_in(hits.mask) {
-                let is_style = |owner| matches!(owner, Owner::Particles | Owner::Style(_));
-                if is_style(self.scene.material(hits.material[lane]).owner)
-                    && let Some(material) = self.source.style(hits.particle[lane])
-                {
-                    hits.material[lane] = material;
-                }
-            }
+        if !self.has_styles {
+            return;
         }
-        if let Some(parts) = self.parts {
-            for lane in lanes_in(hits.lanes_of(MaterialId::PARTICLES)) {
-                hits.material[lane] = self.material_of(parts, hits.particle[lane]);
+        // Spheres of several styles are one shape, which has the material of one of them
+        let hits = &mut packet.hits;
+        for lane in lanes_in(hits.mask) {
+            if self.scene.material(hits.material[lane]).owner.has_styles()
+                && let Some(material) = self.source.style(hits.particle[lane])
+            {
+                hits.material[lane] = material;
             }
         }
     }

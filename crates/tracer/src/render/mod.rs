@@ -96,10 +96,6 @@ mod opacity_tests;
 #[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
-mod part_caustics_tests;
-#[cfg(test)]
-mod part_tests;
-#[cfg(test)]
 mod path_tests;
 #[cfg(test)]
 mod poison_tests;
@@ -111,6 +107,10 @@ mod rods_tests;
 pub(crate) mod solid;
 #[cfg(test)]
 mod spray_tests;
+#[cfg(test)]
+mod style_caustics_tests;
+#[cfg(test)]
+mod style_tests;
 #[cfg(test)]
 mod whitted_tests;
 

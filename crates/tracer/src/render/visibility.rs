@@ -18,7 +18,7 @@ use super::{
     shading::product,
     stream::SegmentPacket,
 };
-use spherule_surface::{Intersections, MaterialId, Shape};
+use spherule_surface::{Intersections, Shape};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
 use spherule_tree::ray::RayPacket;
@@ -110,21 +110,15 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Computes the transmittance of separate spheres; some may be opaque. Returns the lanes in which it is not 0.
+    /// Computes the transmittance of separate spheres. Returns the lanes in which it is not 0.
     fn cross_spheres(
         &self,
         spheres: &dyn Shape,
         samples: &LightSamples,
         transmittance: &mut Lanes3,
     ) -> u32 {
-        // Parts with an opaque material let nothing through
-        let is_opaque = |particle: u32| {
-            let material = self.parts.map(|parts| self.material_of(parts, particle));
-            material.is_some_and(|material| material != MaterialId::PARTICLES)
-        };
-        let fresnel_transmittance = |cosine: f32, particle: u32| {
-            if is_opaque(particle) { 0.0 } else { self.boundary.straight_transmittance(cosine) }
-        };
+        let fresnel_transmittance =
+            |cosine: f32, _: u32| self.boundary.straight_transmittance(cosine);
         // Light crosses spheres in a straight line, and has one transmittance for all colours
         spheres.transmittance(
             &samples.rays,

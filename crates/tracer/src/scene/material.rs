@@ -12,12 +12,12 @@ use super::ground;
 /// What has a material.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Owner {
-    /// The particles, unless they belong to a part with a material of its own.
+    /// The particles without a style.
     Particles,
-    /// Parts of the particles; the number counts the materials of parts.
-    Part(u16),
     /// Particles that are drawn in a style of their own; the number counts such styles.
     Style(u16),
+    /// The same, if nothing but their material differs: parts of the particles.
+    Part(u16),
     /// Foam and spray.
     Spray,
     /// The ground.
@@ -29,7 +29,12 @@ pub enum Owner {
 impl Owner {
     /// Whether surfaces of the material belong to particles, which have attributes.
     pub const fn is_of_particles(self) -> bool {
-        matches!(self, Self::Particles | Self::Part(_) | Self::Style(_) | Self::Spray)
+        self.has_styles() || matches!(self, Self::Spray)
+    }
+
+    /// Whether the style of a particle says which material its surface has.
+    pub(crate) const fn has_styles(self) -> bool {
+        matches!(self, Self::Particles | Self::Style(_) | Self::Part(_))
     }
 }
 

@@ -19,7 +19,6 @@ pub mod ground;
 pub mod lens;
 pub mod light;
 pub mod material;
-pub mod part;
 pub mod path;
 pub mod projection;
 pub mod rgb;
@@ -39,7 +38,6 @@ pub use ground::{Ground, WetGround};
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Finish, Fresnel, Material, MaterialError, Owner};
-pub use part::PartMaterials;
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use projection::Projection;
 pub use rgb::{RgbEncoding, is_rgb};
@@ -103,8 +101,6 @@ pub struct Scene {
     /// The materials by [`MaterialId`]: of the particles, of spray and of the ground, and then those of
     /// [`Self::add`], [`Self::add_style`] and [`Self::add_part`].
     pub materials: Vec<Material>,
-    /// Which parts of the particles have a material of their own, for path tracing of separate spheres.
-    pub parts: PartMaterials,
     /// Background for rays without an intersection.
     pub background: Background,
     /// Optional ground.
@@ -152,7 +148,6 @@ impl Scene {
             lights: Vec::new(),
             ambient_light: Vec3::ONE,
             materials: Self::basic_materials(Material::DEFAULT),
-            parts: PartMaterials::default(),
             background: Background::Constant(Vec3::ZERO),
             ground: None,
             wet_ground: None,
@@ -165,7 +160,7 @@ impl Scene {
         }
     }
 
-    /// The materials of a scene without meshes, rods and parts.
+    /// The materials of a scene without meshes, rods and styles.
     pub fn basic_materials(particles: Material) -> Vec<Material> {
         let spray = Material { owner: Owner::Spray, ..Material::matte(SPRAY_COLOR) };
         let basic: [Material; MaterialId::BASIC] = [particles, spray, material::MATTE];
@@ -182,11 +177,9 @@ impl Scene {
         self.push(material, Owner::Style)
     }
 
-    /// Adds the material of the particles of `parts`, unless they have one; None as in [`Self::add`].
-    pub fn add_part(&mut self, parts: &[i32], material: Material) -> Option<MaterialId> {
-        let id = self.push(material, Owner::Part)?;
-        self.parts.insert(parts, id);
-        Some(id)
+    /// The same, with a name of its own in Cryptomatte: of parts of the particles.
+    pub fn add_part(&mut self, material: Material) -> Option<MaterialId> {
+        self.push(material, Owner::Part)
     }
 
     /// Appends a material of an owner that counts those of its kind.
@@ -208,7 +201,7 @@ impl Scene {
         &self.materials[id.index()]
     }
 
-    /// The material of the particles, apart from parts with their own.
+    /// The material of the particles without a style.
     pub fn particle_material(&self) -> &Material {
         self.material(MaterialId::PARTICLES)
     }
@@ -238,16 +231,15 @@ mod tests {
     fn materials_are_numbered_by_their_owners() {
         let view = CameraView { eye: DVec3::X, look_at: DVec3::ZERO, up: DVec3::Z, fov: 30.0 };
         let mut scene = Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap());
-        let part = scene.add_part(&[3], Material::DEFAULT).unwrap();
+        let part = scene.add_part(Material::DEFAULT).unwrap();
         let ids = [0.1, 0.2].map(|grey| scene.add(Material::matte(Vec3::splat(grey))).unwrap());
-        let last = scene.add_part(&[3, 4], Material::DEFAULT).unwrap();
+        let last = scene.add_part(Material::DEFAULT).unwrap();
         assert_eq!([part, ids[0], ids[1], last].map(MaterialId::index), [3, 4, 5, 6]);
         let owners = scene.materials.iter().map(|material| material.owner).collect::<Vec<_>>();
         let [particles, spray, ground] = [Owner::Particles, Owner::Spray, Owner::Ground];
         let added = [Owner::Part(0), Owner::Thing(0), Owner::Thing(1), Owner::Part(1)];
         assert_eq!(owners[..3], [particles, spray, ground]);
         assert_eq!(owners[3..], added);
-        assert_eq!([3, 4, 5].map(|p| scene.parts.of(p)), [Some(part), Some(last), None]);
         // No material is lost or replaced at the end of the numbers
         scene.materials.resize(MaterialId::MAX, Material::DEFAULT);
         assert_eq!(scene.add(Material::DEFAULT), None);

@@ -35,19 +35,13 @@ impl PathIntegrator<'_> {
     pub(super) fn takes_photons(&self, material: MaterialId) -> bool {
         match self.context.scene.material(material).owner {
             Owner::Thing(_) => true,
-            Owner::Part(_) => self.parts_take_photons(),
-            Owner::Style(_) => {
+            // Photons see the particles in the middle of the exposure, and would light other points of those that move
+            Owner::Style(_) | Owner::Part(_) => {
                 let is_clear = self.context.shapes.is_transmissive(material);
                 !is_clear && self.context.cameras.exposure.is_none()
             }
             Owner::Particles | Owner::Spray | Owner::Ground => false,
         }
-    }
-
-    /// Whether photons light opaque particles beside transmissive ones. Photons see the particles in the middle of the
-    /// exposure, and would light other points of particles that move.
-    pub(super) fn parts_take_photons(&self) -> bool {
-        self.context.parts.is_some() && self.context.cameras.exposure.is_none()
     }
 
     /// Adds the light of photons that `lanes` of a surface reflect.

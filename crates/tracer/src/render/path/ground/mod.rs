@@ -223,8 +223,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Grou
     // Photons at surfaces are stored one by one
     let has_opaque = scene.materials.iter().any(|material| match material.owner {
         Owner::Thing(_) => !material.is_pane(),
-        Owner::Part(_) => true,
-        Owner::Style(_) => !is_clear(material),
+        Owner::Style(_) | Owner::Part(_) => !is_clear(material),
         Owner::Particles | Owner::Spray | Owner::Ground => false,
     });
     let has_surfaces = emits && has_opaque;
@@ -351,7 +350,7 @@ impl<'a> PathIntegrator<'a> {
 
     fn has_opaque_surfaces(&self) -> bool {
         let mut shapes = self.context.shapes.solid.iter();
-        self.parts_take_photons() || shapes.any(|shape| self.takes_photons(shape.material()))
+        shapes.any(|shape| self.takes_photons(shape.material()))
     }
 
     /// Adds the light that the ground reflects, where the paths of `surface` end.

@@ -1,4 +1,4 @@
-//! Materials of parts against images in which all particles have the material of one part.
+//! Materials of styles against images in which all particles have the material of one style.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -14,18 +14,29 @@ use crate::scene::{
     Background, Camera, CameraView, EnvironmentAxes, Finish, Fresnel, Ground, Light, LightKind,
     Material,
 };
+use spherule_surface::{MaterialId, OwnedBody, Shape};
 
 /// The colours of the two particles.
 const COLORS: [Vec3; 2] = [Vec3::new(0.2, 0.7, 0.3), Vec3::new(0.8, 0.4, 0.1)];
 
-/// Two balls beside each other, of the parts 5 and -1.
-fn pair() -> Balls {
-    let ball = |x: f32| Ball { center: Vec3::new(x, 0.0, 0.0), radius: 0.9 };
-    Balls(vec![ball(-1.0), ball(1.0)])
+/// Two balls beside each other.
+const PAIR: [Ball; 2] = [ball(-1.0), ball(1.0)];
+
+const fn ball(x: f32) -> Ball {
+    Ball { center: Vec3::new(x, 0.0, 0.0), radius: 0.9 }
+}
+
+/// The colours of a style.
+type Own = Colors<'static>;
+
+/// The balls, of which the last ones have styles.
+struct Styled {
+    scene: Scene,
+    colors: Vec<Own>,
 }
 
 /// Looks along +y from a distance of 10.
-fn scene(material: Material, parts: Vec<Part>) -> Scene {
+fn styled(material: Material, styles: &[(Finish, Own)]) -> Styled {
     let view = CameraView {
         eye: DVec3::new(0.0, -10.0, 0.0),
         look_at: DVec3::ZERO,
@@ -39,10 +50,10 @@ fn scene(material: Material, parts: Vec<Part>) -> Scene {
         materials: Scene::basic_materials(material),
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     };
-    for (parts, material) in parts {
-        scene.add_part(&parts, material).unwrap();
+    for (finish, _) in styles {
+        scene.add_style(opaque(*finish)).unwrap();
     }
-    scene
+    Styled { scene, colors: styles.iter().map(|(_, colors)| *colors).collect() }
 }
 
 fn opaque(finish: Finish) -> Material {
@@ -53,28 +64,42 @@ fn glass() -> Material {
     Material { transmission: 1.0, fresnel: Fresnel::Exact, ior: 1.5, ..Material::DEFAULT }
 }
 
-/// Parts, and their material.
-type Part = (Vec<i32>, Material);
-
-fn part(parts: &[i32], finish: Finish, color: Option<Vec3>) -> Part {
-    (parts.to_vec(), Material { finish, color, ..Material::DEFAULT })
+fn style_id(style: usize) -> MaterialId {
+    MaterialId::at(MaterialId::BASIC + style).unwrap()
 }
 
-fn image(scene: &Scene, bounces: u32, colors: &[Vec3]) -> Film {
+/// An image of both balls as one shape, or as two beside a clear one.
+fn image(Styled { scene, colors }: &Styled, bounces: u32) -> Film {
     let settings = RenderSettings {
         samples: 16,
         bounces,
         integrator: IntegratorKind::Path,
         ..RenderSettings::new(32, 32)
     };
+    let first = PAIR.len() - colors.len();
+    let styles = colors.iter().enumerate().map(|(style, colors)| StyleShading {
+        first: u32::try_from(first + style).unwrap(),
+        material: style_id(style),
+        colors: *colors,
+        opacities: Opacities::Constant(1.0),
+    });
     let source = ParticleShading {
-        colors: Colors::PerParticle(colors),
-        parts: Some(("part", &[5, -1])),
+        colors: Colors::PerParticle(&COLORS),
+        styles: styles.collect(),
         ..ParticleShading::constant(Vec3::ZERO)
     };
     let never = AtomicBool::new(false);
-    let rendered = render(&[&pair()], scene, &source, &settings, &never);
-    rendered.unwrap().0
+    let is_clear = scene.particle_material().transmission > 0.0;
+    let together = if is_clear { first } else { PAIR.len() };
+    let particles = Balls(PAIR[..together].to_vec());
+    let alone = (together..PAIR.len()).map(|i| {
+        let body = Box::new(Balls(vec![PAIR[i]]));
+        OwnedBody::new(body, style_id(i - first), u32::try_from(i).unwrap())
+    });
+    let alone: Vec<OwnedBody<'_>> = alone.collect();
+    let shapes: Vec<&dyn Shape> =
+        std::iter::once(&particles as &dyn Shape).chain(alone.iter().map(|b| b as _)).collect();
+    render(&shapes, scene, &source, &settings, &never).unwrap().0
 }
 
 /// The left or the right half of an image.
@@ -85,48 +110,48 @@ fn half(film: &Film, right: bool) -> Vec<[f32; 4]> {
 
 const METAL: Finish = Finish::Metal { roughness: 0.3 };
 const PLASTIC: Finish = Finish::Plastic { roughness: 0.4 };
+const USUAL: Own = Colors::PerParticle(&COLORS);
 
 #[test]
-fn each_part_looks_as_if_all_particles_had_its_material() {
+fn each_style_looks_as_if_all_particles_had_its_material() {
     // Without bounces, the material of one particle does not change the light on the other
-    let all = |finish| image(&scene(opaque(finish), Vec::new()), 0, &COLORS);
+    let all = |finish| image(&styled(opaque(finish), &[]), 0);
     let (matte, metal, plastic) = (all(Finish::Matte), all(METAL), all(PLASTIC));
     assert_ne!(half(&matte, true), half(&metal, true));
-    let parts = |parts| image(&scene(opaque(Finish::Matte), parts), 0, &COLORS);
-    let mixed = parts(vec![part(&[3, -1], METAL, None)]);
+    let with = |styles: &[(Finish, Own)]| image(&styled(opaque(Finish::Matte), styles), 0);
+    let mixed = with(&[(METAL, USUAL)]);
     assert_eq!(half(&mixed, false), half(&matte, false));
     assert_eq!(half(&mixed, true), half(&metal, true));
-    let both = parts(vec![part(&[-1], METAL, None), part(&[5], PLASTIC, None)]);
+    let both = with(&[(PLASTIC, USUAL), (METAL, USUAL)]);
     assert_eq!(half(&both, false), half(&plastic, false));
     assert_eq!(half(&both, true), half(&metal, true));
 }
 
 #[test]
-fn a_part_may_have_its_own_colour() {
-    let blue = Vec3::new(0.1, 0.2, 0.9);
-    let plain = scene(opaque(Finish::Matte), Vec::new());
-    let expected = image(&plain, 0, &[COLORS[0], blue]);
-    let parts = vec![part(&[-1], Finish::Matte, Some(blue))];
-    let found = image(&scene(opaque(Finish::Matte), parts), 0, &COLORS);
-    assert_eq!(found.color, expected.color);
+fn a_style_may_have_its_own_colour() {
+    let plain = image(&styled(opaque(Finish::Matte), &[]), 0);
+    let own = [(Finish::Matte, Colors::Constant(COLORS[0]))];
+    let found = image(&styled(opaque(Finish::Matte), &own), 0);
+    assert_eq!(half(&found, false), half(&plain, false));
+    assert_ne!(half(&found, true), half(&plain, true));
+    let usual = [(Finish::Matte, Colors::Constant(COLORS[1]))];
+    assert_eq!(image(&styled(opaque(Finish::Matte), &usual), 0).color, plain.color);
 }
 
 #[test]
-fn light_bounces_between_parts() {
-    let white = |parts| scene(opaque(Finish::Matte), parts);
-    let direct = image(&white(vec![part(&[-1], METAL, None)]), 0, &COLORS);
-    let more = image(&white(vec![part(&[-1], METAL, None)]), 4, &COLORS);
+fn light_bounces_between_styles() {
+    let metal = styled(opaque(Finish::Matte), &[(METAL, USUAL)]);
+    let (direct, more) = (image(&metal, 0), image(&metal, 4));
     let sum = |film: &Film| film.color.iter().map(|c| c[0]).sum::<f32>();
     assert!(sum(&more) > 1.01 * sum(&direct));
 }
 
 #[test]
-fn opaque_parts_are_among_transmissive_spheres() {
+fn opaque_styles_are_among_transmissive_spheres() {
     // The opaque ball is that of an opaque scene, but for the light that passes the other ball
-    let matte = part(&[-1], Finish::Matte, None);
-    let mixed = image(&scene(glass(), vec![matte]), 0, &COLORS);
-    let clear = image(&scene(glass(), Vec::new()), 0, &COLORS);
-    let solid = image(&scene(opaque(Finish::Matte), Vec::new()), 0, &COLORS);
+    let mixed = image(&styled(glass(), &[(Finish::Matte, USUAL)]), 0);
+    let clear = image(&styled(glass(), &[]), 0);
+    let solid = image(&styled(opaque(Finish::Matte), &[]), 0);
     let mean = |pixels: &[[f32; 4]]| pixels.iter().map(|c| c[1]).sum::<f32>() / pixels.len() as f32;
     let [mixed_right, solid_right] = [&mixed, &solid].map(|film| mean(&half(film, true)));
     assert!((mixed_right / solid_right - 1.0).abs() < 0.15, "{mixed_right} {solid_right}");
@@ -135,7 +160,7 @@ fn opaque_parts_are_among_transmissive_spheres() {
 }
 
 #[test]
-fn opaque_parts_throw_full_shadows() {
+fn opaque_styles_throw_full_shadows() {
     // A light above, a ground below: only the shadow of the opaque ball is black
     let light = Light {
         kind: LightKind::Directional { to_light: Vec3::Z },
@@ -152,14 +177,15 @@ fn opaque_parts_throw_full_shadows() {
     };
     let bounds = crate::scene::Bounds { min: DVec3::splat(-1.9), max: DVec3::splat(1.9) };
     // The pixels of points in both shadows
-    let shadows = |parts: Vec<Part>| {
-        let mut scene = scene(glass(), parts);
+    let shadows = |styles: &[(Finish, Own)]| {
+        let mut balls = styled(glass(), styles);
+        let scene = &mut balls.scene;
         scene.ground = Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO));
         scene.environment = None;
         scene.lights = vec![light];
         scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-        let film = image(&scene, 0, &COLORS);
         let camera = shading::CameraLanes::new(&scene.camera, 32, 32);
+        let film = image(&balls, 0);
         [-1.0, 1.0].map(|x| {
             let [column, row] = camera.pixel_of(Vec3::new(x, -0.6, -1.9)).unwrap();
             #[expect(
@@ -171,8 +197,8 @@ fn opaque_parts_throw_full_shadows() {
             film.color[pixel][1]
         })
     };
-    let [left, right] = shadows(Vec::new());
+    let [left, right] = shadows(&[]);
     assert!(left > 0.01 && right > 0.01, "{left} {right}");
-    let [left, right] = shadows(vec![part(&[-1], Finish::Matte, None)]);
+    let [left, right] = shadows(&[(Finish::Matte, USUAL)]);
     assert!(left > 0.01 && right == 0.0, "{left} {right}");
 }

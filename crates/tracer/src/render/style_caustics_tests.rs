@@ -13,14 +13,14 @@ use super::{
 use crate::scene::{
     Background, Camera, CameraView, Environment, EnvironmentAxes, Light, LightKind, RadianceMap,
 };
+use spherule_surface::{MaterialId, OwnedBody};
 
 /// Rows of the bright cap around the zenith, of 256.
 const CAP_ROWS: usize = 9;
 
-/// A ball of glass above an opaque one, which is white.
-fn balls() -> Balls {
-    let ball = |z: f32| Ball { center: z * Vec3::Z, radius: 0.6 };
-    Balls(vec![ball(1.3), ball(0.0)])
+/// A ball at this height: one of glass is above an opaque one, which is white.
+fn ball(z: f32) -> Balls {
+    Balls(vec![Ball { center: z * Vec3::Z, radius: 0.6 }])
 }
 
 /// The opaque ball from the side.
@@ -39,7 +39,7 @@ fn scene(environment: Environment, lights: Vec<Light>) -> Scene {
         particles: [Vec3::new(-0.6, -0.6, -0.6), Vec3::new(0.6, 0.6, 1.9)],
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     };
-    scene.add_part(&[1], Material::DEFAULT).unwrap();
+    scene.add_style(Material::DEFAULT).unwrap();
     scene
 }
 
@@ -55,10 +55,17 @@ fn sun(half_angle: f64, irradiance: f32) -> Light {
 
 fn image(scene: &Scene, photons: u32, samples: u32) -> Film {
     let settings = RenderSettings { photons, max_depth: 8, ..settings(32, samples, 0) };
-    let source =
-        ParticleShading { parts: Some(("part", &[0, 1])), ..ParticleShading::constant(Vec3::ONE) };
+    let material = MaterialId::at(MaterialId::BASIC).unwrap();
+    let style = StyleShading {
+        first: 1,
+        material,
+        colors: Colors::Constant(Vec3::ONE),
+        opacities: Opacities::Constant(1.0),
+    };
+    let source = ParticleShading { styles: vec![style], ..ParticleShading::constant(Vec3::ONE) };
+    let opaque = OwnedBody::new(Box::new(ball(0.0)), material, 1);
     let never = AtomicBool::new(false);
-    render(&[&balls()], scene, &source, &settings, &never).unwrap().0
+    render(&[&ball(1.3), &opaque], scene, &source, &settings, &never).unwrap().0
 }
 
 /// Means of the red parts of squares of four by four pixels.
