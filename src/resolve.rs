@@ -10,11 +10,11 @@ use crate::manifest::{Manifest, Side, StyledManifest};
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
-    FileSettings, FrameSize, GrainMeshes, MemoryModel, ParticleRules, Picture, PictureMesh,
-    RadiusRule, Setup, Things, gpu,
+    FileSettings, FrameSize, GrainMeshes, MemoryModel, ParticleRules, ParticleStyle, Picture,
+    PictureMesh, RadiusRule, Setup, StyleForm, Things, gpu,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, Environment, Texture};
+use crate::scene::{Bounds, Environment, MaterialId, Texture};
 use crate::selection::Division;
 use crate::survey::Survey;
 
@@ -150,7 +150,19 @@ fn setup_on(
     let place = (survey, &color, extent.reach);
     let mut arrows = arrows::arrows(&mut scene, &manifest.arrows, place)?;
     let mut trails = arrows::trails(&mut scene, &manifest.trails, place)?;
-    let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
+    let first = ParticleStyle {
+        name: "particles".to_owned(),
+        is_named: false,
+        is_of_rest: true,
+        shares_colors: true,
+        form: StyleForm::of(manifest.surface),
+        opacity: opacity::opacity(&manifest.material.opacity, survey)?,
+        material: MaterialId::PARTICLES,
+        bonds: bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?,
+        radius_factor: 1.0,
+        radius,
+        color,
+    };
     let looks = styles::Looks {
         manifest,
         survey,
@@ -160,7 +172,7 @@ fn setup_on(
         bounds: extent.bounds,
         priority: u8::from(!styled.has_first),
     };
-    let styles = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;
+    let others = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;
     // Collect the settings of the images
     let (channels, attributes) = channels::channels(manifest, survey)?;
     let denoise = denoise::settings(manifest, scene.particle_material());
@@ -175,12 +187,9 @@ fn setup_on(
         particles: ParticleRules {
             selection: select::selection(manifest, survey)?,
             cut: select::cut(manifest, survey)?,
-            radius,
             least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
-            color,
-            opacity: opacity::opacity(&manifest.material.opacity, survey)?,
             division: Division { up: Some(extent.up), ..styled.division.clone() },
-            styles,
+            styles: std::iter::once(first).chain(others).collect(),
         },
         files: FileSettings {
             exr: images::exr_options(manifest, &attributes, &render, placed.view.projection),
@@ -193,7 +202,7 @@ fn setup_on(
         },
         view: placed.view,
         scene,
-        things: Things { meshes, cell, arrows, trails, bonds },
+        things: Things { meshes, cell, arrows, trails },
         surface: manifest.surface,
         renderer: manifest.render.device.renderer(),
         step: channels::frame_step(&render.channels, &manifest.output, survey)?,

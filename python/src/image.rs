@@ -117,7 +117,7 @@ impl NativeImage {
     /// Smallest and largest value of the colour map, if there is one.
     #[getter]
     fn color_range(&self) -> Option<(f64, f64)> {
-        match &self.image.setup().picture.particles.color {
+        match &self.image.setup().picture.particles.first().color {
             spherule::pipeline::ColorRule::Attribute { map, .. } => {
                 map.range().map(|([low, high], _)| (low, high))
             }

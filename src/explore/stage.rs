@@ -426,10 +426,10 @@ fn build_key(prepared: &Prepared, frame: i64) -> String {
         "{frame} {:?} {:?} {:?} {:?} {:?} {} {others:?}",
         picture.origin,
         picture.renderer,
-        picture.particles.radius,
+        picture.particles.first().radius,
         picture.files.overlay_values,
         prepared.manifest().render.memory_limit,
-        colored_by(&picture.particles.color, picture.renderer),
+        colored_by(&picture.particles.first().color, picture.renderer),
     )
 }
 

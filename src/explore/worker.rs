@@ -131,7 +131,7 @@ fn facts(
 
 /// The values at the ends of the colours, if these follow a value.
 fn color_range(setup: &Setup) -> Option<[f64; 2]> {
-    match &setup.picture.particles.color {
+    match &setup.picture.particles.first().color {
         ColorRule::Attribute { map, .. } => map.range().map(|(range, _)| range),
         _ => None,
     }

@@ -49,7 +49,7 @@ pub(super) fn build_grid(
     };
     // Keep the particles if attributes are looked up at points of the surface
     let rules = &setup.picture.particles;
-    let is_colored = rules.color.is_by_particle() || !rules.styles.is_empty();
+    let is_colored = rules.first().color.is_by_particle() || rules.is_divided();
     let keep = setup.picture.render.channels.needs_particles() || is_colored;
     let left = memory_left(setup.run.memory_limit);
     let own = particles.centers;

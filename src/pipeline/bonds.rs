@@ -44,11 +44,12 @@ pub(super) fn bonds_of(
     place: (i64, &str),
     notes: &mut Vec<String>,
 ) -> Result<Vec<FrameRods>, LoadError> {
-    let first = setup.picture.things.bonds.as_ref().map(|bonds| (bonds, ranges.first()));
     let styles = setup.picture.particles.styles.iter().enumerate();
-    let of_styles = styles.filter_map(|(i, style)| Some((style.bonds.as_ref()?, ranges.of(i))));
-    let all = first.into_iter().chain(of_styles).filter(|(_, range)| !range.is_empty());
-    all.map(|(bonds, range)| bonds_in(setup, (frame, range), bonds, place, notes)).collect()
+    styles
+        .filter_map(|(i, style)| Some((style.bonds.as_ref()?, ranges.of(i))))
+        .filter(|(_, range)| !range.is_empty())
+        .map(|(bonds, range)| bonds_in(setup, (frame, range), bonds, place, notes))
+        .collect()
 }
 
 /// The bonds of the particles in a range of a frame; those with others are drawn up to the middle.

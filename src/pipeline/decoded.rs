@@ -11,7 +11,7 @@ use spherule_formats::{Attribute, AttributeData, Radius};
 use super::SharedFrame;
 use super::grains::{FrameGrains, grains_of};
 use super::load_error::{LoadError, missing, missing_value};
-use super::setup::{ColorRule, OpacityRule, ParticleRules, Setup};
+use super::setup::{ColorRule, OpacityRule, Setup};
 use super::styles::StyleRanges;
 use crate::scene::material::DEFAULT_COLOR;
 use crate::scene::{Camera, ColorMap, RgbEncoding};
@@ -112,20 +112,16 @@ fn styled_values(
     (number, file): (i64, &str),
     radius: &Radius,
 ) -> Result<DecodedShading, LoadError> {
-    let ParticleRules { color, opacity, styles, .. } = &setup.picture.particles;
-    let of_styles = styles.iter().enumerate();
-    let of_styles = of_styles.map(|(i, style)| (&style.color, &style.opacity, ranges.of(i)));
     let mut found = DecodedShading::default();
     let count = frame.len();
-    for (color, opacity, range) in
-        std::iter::once((color, opacity, ranges.first())).chain(of_styles)
-    {
+    for (index, style) in setup.picture.particles.styles.iter().enumerate() {
+        let range = ranges.of(index);
         let particles = (frame, range.clone());
         let (values, colors) =
-            color_values(setup, particles.clone(), (number, file), radius, color)?;
+            color_values(setup, particles.clone(), (number, file), radius, &style.color)?;
         fill(&mut found.values, count, range.start, values, f32::NAN);
         fill(&mut found.colors, count, range.start, colors, DEFAULT_COLOR);
-        let opacities = opacities_of(setup, particles, (number, file), radius, opacity)?;
+        let opacities = opacities_of(setup, particles, (number, file), radius, &style.opacity)?;
         fill(&mut found.opacities, count, range.start, opacities, f32::NAN);
     }
     Ok(found)
@@ -249,7 +245,7 @@ pub(super) fn colors_by<'a>(
         return Ok(RuledColors::Constant(*color));
     }
     let all = 0..frame.len();
-    let radius_rule = (&setup.picture.particles.radius, 1.0);
+    let radius_rule = (&setup.picture.particles.first().radius, 1.0);
     let radius = radii_of(setup, radius_rule, frame, all.clone(), file)?.radius;
     let (values, colors) = color_values(setup, (frame, all), (number, file), &radius, rule)?;
     Ok(match rule {

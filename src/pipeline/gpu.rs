@@ -120,15 +120,15 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
         (picture.view.shutter.is_some()).then(|| ("camera.shutter", "motion blur".to_owned())),
         (picture.surface.kind != SurfaceKind::Spheres)
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
-        (rules.opacity != OpacityRule::OPAQUE)
+        (rules.first().opacity != OpacityRule::OPAQUE)
             .then(|| ("material.opacity", "opacities below 1".to_owned())),
-        (!rules.styles.is_empty()).then(|| ("style", "styles".to_owned())),
+        rules.is_divided().then(|| ("style", "styles".to_owned())),
         (!rules.cut.is_everywhere()).then(|| ("clip", "particles that are cut".to_owned())),
         (!things.meshes.is_empty()).then(|| ("mesh", "meshes".to_owned())),
         (things.cell.is_some()).then(|| ("cell", "the simulation cell".to_owned())),
         (!things.arrows.is_empty()).then(|| ("arrows", "arrows".to_owned())),
         (!things.trails.is_empty()).then(|| ("trails", "trails".to_owned())),
-        (things.bonds.is_some()).then(|| ("bonds", "bonds".to_owned())),
+        rules.first().bonds.is_some().then(|| ("bonds", "bonds".to_owned())),
     ]
     .into_iter()
     .flatten()
@@ -180,9 +180,9 @@ fn key_of(missing: Missing) -> &'static str {
 /// Memory of the device for a frame with that many particles, bytes.
 pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
     let picture = &setup.picture;
-    let is_common = matches!(picture.particles.radius, RadiusRule::Common(_));
+    let is_common = matches!(picture.particles.first().radius, RadiusRule::Common(_));
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
-    let colors = if picture.particles.color.is_by_particle() { 12 * particles } else { 0 };
+    let colors = if picture.particles.first().color.is_by_particle() { 12 * particles } else { 0 };
     let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
     let has_paths = picture.render.integrator == IntegratorKind::Path;
     let of_pixel = bytes_per_pixel(has_paths, lights, picture.render.has_features);

@@ -128,7 +128,7 @@ impl StoredFrame {
         // Look up the attributes by the names that were found when the frame was opened
         let frame = self.frame();
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
-        let color = match &picture.particles.color {
+        let color = match &picture.particles.first().color {
             ColorRule::Constant(color) => Some(StoredColor::Constant(*color)),
             ColorRule::Rgb { .. } => view(&self.names.rgb)
                 .map(|values| StoredColor::Rgb { encoding: encoding(&values), values }),
@@ -143,7 +143,7 @@ impl StoredFrame {
         };
         let color = color.unwrap_or(StoredColor::Constant(default));
         // Choose how opacities are looked up
-        let opacity = match (&picture.particles.opacity, &self.names.opacity) {
+        let opacity = match (&picture.particles.first().opacity, &self.names.opacity) {
             (OpacityRule::Constant(opacity), _) => StoredOpacity::Constant(*opacity),
             (OpacityRule::Value { range, .. }, value) => {
                 let values =
@@ -241,7 +241,7 @@ impl Names {
         let columns = Columns::of(file);
         // Find the attributes that settings name
         let (mut rgb, mut values) = (None, None);
-        match &setup.picture.particles.color {
+        match &setup.picture.particles.first().color {
             ColorRule::Constant(_) => {}
             ColorRule::Rgb { name, required } => rgb = columns.find(name, "colour", *required)?,
             ColorRule::Attribute { name, required, .. } => {
@@ -249,7 +249,7 @@ impl Names {
             }
         }
         let mut opacity = None;
-        if let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity {
+        if let OpacityRule::Value { name, .. } = &setup.picture.particles.first().opacity {
             opacity = columns.value(name, "opacity", true)?;
         }
         // Find the attributes with channels
@@ -347,7 +347,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         );
     }
     // Find the radii
-    let common = match (&setup.picture.particles.radius, &index.radius) {
+    let common = match (&setup.picture.particles.first().radius, &index.radius) {
         (RadiusRule::Attribute { .. } | RadiusRule::Table { .. }, _) => {
             return Err("the radius is an attribute, for 12 bytes per particle and more".to_owned());
         }

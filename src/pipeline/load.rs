@@ -163,7 +163,7 @@ pub fn load_particles<'a>(
     let start = Instant::now();
     let read = particles.positions.len() as u64;
     let rules = &setup.picture.particles;
-    let (frame, ranges) = if rules.selection.is_all() && rules.division.is_one() {
+    let (frame, ranges) = if rules.selection.is_all() && !rules.is_divided() {
         one_range(ParticleFrame::borrowed(particles, setup.picture.origin))
     } else {
         selected(setup, particles.to_owned_particles(), name)?
@@ -313,7 +313,7 @@ impl LoadedFrame<'_> {
             return;
         };
         let styles = setup.picture.particles.styles.iter().enumerate();
-        let absent = styles.filter(|(index, style)| {
+        let absent = styles.skip(1).filter(|(index, style)| {
             !style.is_of_rest && frame.shading.ranges.of(*index).is_empty()
         });
         let is_empty = frame.centers.is_empty();

@@ -76,7 +76,7 @@ fn surface_text(setup: &Setup) -> String {
         return String::new();
     }
     let voxel = setup.picture.surface.voxel;
-    match setup.picture.particles.radius {
+    match setup.picture.particles.first().radius {
         RadiusRule::Common(radius) | RadiusRule::FileOr(radius) if radius > 0.0 => format!(
             " for a smooth surface of particles of radius {radius} in voxels of {}",
             voxel * radius

@@ -249,7 +249,7 @@ fn rods_have_the_colours_of_their_particles() {
             ("bonds", "bonds = { find = 0.25, radius = 0.03 }", 0.16),
         ] {
             let (setup, film) = rendered(&sequence, settings);
-            let ColorRule::Attribute { map, .. } = &setup.picture.particles.color else {
+            let ColorRule::Attribute { map, .. } = &setup.picture.particles.first().color else {
                 panic!("{name}: no map");
             };
             let count = check_rods(&particles, &film, map, reach, &format!("{source}, {name}"));

@@ -245,18 +245,30 @@ pub struct ParticleRules {
     pub selection: Selection,
     /// The region that spheres are cut to.
     pub cut: ConvexRegion,
-    /// Source of the radii.
-    pub radius: RadiusRule,
     /// Minimum radius; smaller ones would be invisible, and are raised to it.
     pub least_radius: f32,
-    /// Source of the colours.
-    pub color: ColorRule,
-    /// How much each sphere covers of what is behind it.
-    pub opacity: OpacityRule,
-    /// Which particles have a style, by its index and 1; the others follow the rules above.
+    /// Which particles have which style, by its index.
     pub division: Division,
-    /// The styles: first those with spheres, then those with bodies, then those with neither.
+    /// The styles, at least one. The first is that of [`Picture::surface`]; behind it are first those with spheres, then
+    /// those with bodies, then those with neither.
     pub styles: Vec<ParticleStyle>,
+}
+
+impl ParticleRules {
+    /// The style of the particles that the manifest gives none, unless a clear one takes their place.
+    pub fn first(&self) -> &ParticleStyle {
+        &self.styles[0]
+    }
+
+    /// The other styles.
+    pub fn others(&self) -> &[ParticleStyle] {
+        &self.styles[1..]
+    }
+
+    /// Whether particles are drawn in different ways.
+    pub const fn is_divided(&self) -> bool {
+        self.styles.len() > 1
+    }
 }
 
 /// What stands for the particles of a style.
@@ -270,6 +282,16 @@ pub enum StyleForm {
     Grains(GrainRules),
     /// Only rods.
     Nothing,
+}
+
+impl StyleForm {
+    /// What a surface makes of particles.
+    pub const fn of(surface: SurfaceSettings) -> Self {
+        match surface.kind {
+            SurfaceKind::Spheres => Self::Spheres,
+            SurfaceKind::Union | SurfaceKind::Smooth => Self::Body(surface),
+        }
+    }
 }
 
 /// How grains are drawn.
@@ -288,7 +310,7 @@ pub struct GrainRules {
     pub exponents: Option<[f32; 2]>,
 }
 
-/// How some of the particles are drawn, unlike the others.
+/// How some of the particles are drawn.
 #[derive(Debug, Clone)]
 pub struct ParticleStyle {
     /// Name in legends and messages.
@@ -347,8 +369,6 @@ pub struct Things {
     pub arrows: Vec<ArrowStyle>,
     /// Trails over earlier frames.
     pub trails: Vec<TrailStyle>,
-    /// Bonds between particles, if they are drawn.
-    pub bonds: Option<BondStyle>,
 }
 
 /// What is written of a picture.
@@ -508,14 +528,14 @@ impl Setup {
         let picture = &self.picture;
         let is_for_channels = picture.render.channels.needs_particles();
         let rules = &picture.particles;
-        let is_for_look = rules.opacity.is_by_particle() || !rules.styles.is_empty();
+        let is_for_look = rules.first().opacity.is_by_particle() || rules.is_divided();
         is_for_channels || is_for_look || picture.render.channels.needs_parts()
     }
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.
     pub fn traces_in_place(&self) -> bool {
         let is_by_attribute = matches!(
-            self.picture.particles.radius,
+            self.picture.particles.first().radius,
             RadiusRule::Attribute { .. } | RadiusRule::Table { .. }
         );
         self.needs_copy().is_none() && !is_by_attribute
@@ -533,18 +553,18 @@ impl Setup {
         }
         // So does everything that chooses, moves or searches particles
         let particles = &self.picture.particles;
-        let Things { arrows, trails, bonds, .. } = &self.picture.things;
+        let Things { arrows, trails, .. } = &self.picture.things;
         let reasons = [
             (
                 !particles.selection.is_all(),
                 "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more",
             ),
             (
-                !particles.division.is_one(),
+                particles.is_divided(),
                 "[[style]] divides a copy of them, 12 bytes per particle and more",
             ),
             (
-                !arrows.is_empty() || !trails.is_empty() || bonds.is_some(),
+                !arrows.is_empty() || !trails.is_empty() || particles.first().bonds.is_some(),
                 "arrows, trails and bonds are made from a copy of them, 12 bytes per particle and more",
             ),
             (self.has_motion(), "motion blur moves a copy of them, 40 bytes per particle and more"),
@@ -575,7 +595,7 @@ impl Setup {
 
     /// Whether colours or opacities are computed from more than attributes.
     fn colors_need_geometry(&self) -> bool {
-        let ParticleRules { color, opacity, .. } = &self.picture.particles;
+        let ParticleStyle { color, opacity, .. } = self.picture.particles.first();
         matches!(color, ColorRule::Attribute { needs_geometry: true, .. })
             || matches!(opacity, OpacityRule::Value { needs_geometry: true, .. })
     }

@@ -27,15 +27,15 @@ pub(super) fn particle_shading<'a>(
     };
     // Styles follow each other in the order of the particles
     let rules = &picture.particles;
-    let styles = rules.styles.iter().enumerate().map(|(index, style)| StyleShading {
+    let styles = rules.styles.iter().enumerate().skip(1).map(|(index, style)| StyleShading {
         first: index_u32(shading.ranges.of(index).start),
         material: style.material,
         colors: colors(&style.color),
         opacities: opacities(&style.opacity),
     });
     ParticleShading {
-        colors: colors(&rules.color),
-        opacities: opacities(&rules.opacity),
+        colors: colors(&rules.first().color),
+        opacities: opacities(&rules.first().opacity),
         styles: styles.collect(),
         ids: shading.ids.as_deref(),
         velocities: shading.velocities.as_deref(),

@@ -82,7 +82,7 @@ impl StyleSurfaces {
         let rules = &setup.picture.particles;
         let mut all = Self::default();
         let mut bytes = 0;
-        if rules.styles.is_empty() {
+        if !rules.is_divided() {
             return Ok((all, bytes));
         }
         all.prior = prior_centers(setup, frame, MaterialId::PARTICLES);
@@ -258,13 +258,10 @@ fn prior_centers(setup: &Setup, frame: &DecodedFrame<'_>, material: MaterialId) 
         return Vec::new();
     }
     let ranges = &frame.shading.ranges;
-    let styles = rules.styles.iter().enumerate();
-    let bodies = styles.filter(|(_, style)| matches!(style.form, StyleForm::Body(_)));
-    let groups = bodies.map(|(index, style)| (style.material, ranges.of(index)));
-    std::iter::once((MaterialId::PARTICLES, ranges.first()))
-        .chain(groups)
-        .filter(|(id, _)| is_clear(*id) && rank(*id) < rank(material))
-        .flat_map(|(_, range)| exposed_centers(setup, frame, range))
+    (rules.styles.iter().enumerate())
+        .filter(|(index, style)| *index == 0 || matches!(style.form, StyleForm::Body(_)))
+        .filter(|(_, style)| is_clear(style.material) && rank(style.material) < rank(material))
+        .flat_map(|(index, _)| exposed_centers(setup, frame, ranges.of(index)))
         .collect()
 }
 

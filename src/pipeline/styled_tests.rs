@@ -105,7 +105,7 @@ fn opaque_spheres_of_all_styles_share_a_tree() {
     );
     let (setup, film, notes) = rendered(&styles);
     assert_eq!(notes, Vec::<String>::new());
-    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 3);
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 4);
     let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
     let pixels = check_points(&film, [near(0.3), near(0.5), near(0.3), [1.0, 0.0], near(0.1)]);
     assert!(pixels[0] > 100 && pixels[1] > 100 && pixels[2] > 100, "{pixels:?}");
@@ -130,7 +130,7 @@ fn bodies_of_styles_have_ids_of_their_particles() {
          [[style]]\nwhere = \"type == 2\"\nradius = 0.35\nmaterial = {{ type = \"metal\" }}"
     );
     let (setup, film, _) = rendered(&styles);
-    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 1);
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 2);
     let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
     let pixels = check_points(&film, [[0.0, 1.2], near(0.7), near(0.35), near(0.4), near(0.4)]);
     assert!(pixels.iter().all(|pixels| *pixels > 100), "{pixels:?}");
@@ -144,7 +144,7 @@ fn one_style_may_be_clear() {
     );
     let (setup, film, _) = rendered(&styles);
     assert_eq!(setup.picture.scene.particle_material().transmission, 1.0);
-    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 0);
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 1);
     let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
     let pixels = check_points(&film, [near(0.4), near(0.5), [0.0, 1.2], near(0.4), near(0.4)]);
     assert!(pixels.iter().all(|pixels| *pixels > 100), "{pixels:?}");
@@ -226,7 +226,7 @@ fn grains_are_where_their_particles_are() {
          [[style]]\nwhere = \"type == 3\"\nradius = 0.3\nopacity = 0.5"
     );
     let (setup, film, notes) = rendered(&styles);
-    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 1);
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 2);
     assert!(notes.iter().all(|note| note.contains("they are drawn upright")), "{notes:?}");
     let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
     let pixels = check_points(&film, [near(0.4), [0.2, 0.6001], [0.2, 0.54], near(0.3), near(0.4)]);

@@ -12,10 +12,10 @@ use super::setup::{ParticleRules, Setup, StyleForm};
 use crate::selection::Divided;
 use crate::surface::SurfaceKind;
 
-/// The particles of the styles of a frame: first those without a style, then those of each.
+/// The particles of the styles of a frame.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct StyleRanges {
-    /// Number of particles up to the end of each, beginning with those without a style.
+    /// Number of particles up to the end of each.
     ends: Vec<usize>,
 }
 
@@ -30,31 +30,27 @@ impl StyleRanges {
         self.ends.last().copied().unwrap_or(0)
     }
 
-    /// The particles that have no style.
-    pub(super) fn first(&self) -> Range<usize> {
-        0..self.ends[0]
-    }
-
     /// The particles of the style with this index.
     pub(super) fn of(&self, style: usize) -> Range<usize> {
-        self.ends[style]..self.ends[style + 1]
+        let start = if style == 0 { 0 } else { self.ends[style - 1] };
+        start..self.ends[style]
     }
 }
 
 impl ParticleRules {
-    /// Number of styles, the first ones, whose spheres are in one tree with the particles without a style.
+    /// Number of styles, the first ones, whose spheres are in one tree.
     pub(super) fn styles_in_tree(&self, setup: &Setup) -> usize {
         let is_opaque = setup.picture.scene.particle_material().transmission == 0.0;
         if is_opaque && setup.picture.surface.kind == SurfaceKind::Spheres {
             self.sphere_styles()
         } else {
-            0
+            1
         }
     }
 
-    /// Number of styles, the first ones, that are drawn as spheres.
+    /// Number of styles, the first ones, that are drawn as spheres, apart from the first, which may be a body.
     pub(super) fn sphere_styles(&self) -> usize {
-        self.styles.partition_point(|style| matches!(style.form, StyleForm::Spheres))
+        1 + self.others().partition_point(|style| matches!(style.form, StyleForm::Spheres))
     }
 }
 
@@ -126,11 +122,10 @@ mod tests {
     #[test]
     fn styles_take_their_particles_from_the_end() {
         let ranges = StyleRanges { ends: vec![2, 5, 5, 6] };
-        assert_eq!(ranges.first(), 0..2);
-        assert_eq!([0, 1, 2].map(|style| ranges.of(style)), [2..5, 5..5, 5..6]);
+        assert_eq!([0, 1, 2, 3].map(|style| ranges.of(style)), [0..2, 2..5, 5..5, 5..6]);
         let mut centers: Cow<'_, [Vec3]> = (0..6_u16).map(|i| Vec3::splat(f32::from(i))).collect();
         let mut radius = Radius::PerParticle((0..6_u16).map(f32::from).collect());
-        let last = StyleParticles::split_off((2, 5), &mut centers, &mut radius);
+        let last = StyleParticles::split_off((3, 5), &mut centers, &mut radius);
         assert_eq!((last.first, &last.centers[..]), (5, &[Vec3::splat(5.0)][..]));
         assert_eq!(last.radius, Radius::PerParticle(vec![5.0]));
         assert_eq!(centers.len(), 5);

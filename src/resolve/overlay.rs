@@ -265,14 +265,14 @@ fn shown_colors(
         let material = setup.picture.scene.material(style.material);
         material.transmission == 0.0 || material.color_length.is_some()
     };
-    let of_styles = rules.styles.iter().filter(shows_colors).map(|style| &style.color);
+    let of_styles = rules.others().iter().filter(shows_colors).map(|style| &style.color);
     let is_seen =
-        rules.styles.is_empty() || (survey.color.is_some() && manifest.material.shows_colors());
+        !rules.is_divided() || (survey.color.is_some() && manifest.material.shows_colors());
     let seen: Vec<&ColorRule> =
-        is_seen.then_some(&rules.color).into_iter().chain(of_styles).collect();
+        is_seen.then_some(&rules.first().color).into_iter().chain(of_styles).collect();
     let mapped = seen.iter().find_map(|rule| color_bar(rule, &seen, (manifest, survey)));
     match mapped.or_else(|| legend_of_styles(&rules.styles)) {
-        None if survey.most_particles > 0 && rules.styles.is_empty() => Err(without_color_map()),
+        None if survey.most_particles > 0 && !rules.is_divided() => Err(without_color_map()),
         shown => Ok(shown),
     }
 }

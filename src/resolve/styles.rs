@@ -75,10 +75,12 @@ impl Looks<'_> {
             };
             let place = (self.survey, &color, self.reach);
             let own = arrows::arrows(scene, style.arrows.as_slice(), place)?;
-            arrows.extend(own.into_iter().map(|own| ArrowStyle { style: Some(index), ..own }));
+            // Those without a style come before it
+            let number = Some(index + 1);
+            arrows.extend(own.into_iter().map(|own| ArrowStyle { style: number, ..own }));
             if let Some(own) = &style.trails {
                 let own = arrows::trails(scene, own, place)?;
-                trails.extend(own.into_iter().map(|own| TrailStyle { style: Some(index), ..own }));
+                trails.extend(own.into_iter().map(|own| TrailStyle { style: number, ..own }));
             }
             looks.push(ParticleStyle {
                 name: drawn.title(),
@@ -131,9 +133,9 @@ impl Looks<'_> {
                 },
             }),
             None => StyleForm::Nothing,
-            Some(SurfaceKind::Spheres) => StyleForm::Spheres,
             Some(kind) => {
-                StyleForm::Body(SurfaceSettings { kind, spray: false, ..self.manifest.surface })
+                let usual = self.manifest.surface;
+                StyleForm::of(SurfaceSettings { kind, spray: false, ..usual })
             }
         }
     }

@@ -34,7 +34,7 @@ impl Check<'_> {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
             put("radius", radius_json(setup, survey));
-            if let ColorRule::Attribute { name, map, .. } = &setup.picture.particles.color {
+            if let ColorRule::Attribute { name, map, .. } = &setup.picture.particles.first().color {
                 let range = map.range().map(|(range, _)| range);
                 put("range", json!({"value": shown_name(name), "ends": range}));
             }
@@ -213,7 +213,7 @@ fn channels(manifest: &Manifest) -> Vec<Cow<'static, str>> {
 
 /// The structure for the largest surveyed frame. Other frames may have another.
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
-    let has_values = setup.picture.particles.color.is_by_particle();
+    let has_values = setup.picture.particles.first().color.is_by_particle();
     setup.build_settings(survey.most_particles, has_values).structure
 }
 
@@ -233,7 +233,7 @@ fn image_json(manifest: &Manifest) -> Value {
 }
 
 fn radius_json(setup: &Setup, survey: &Survey) -> Value {
-    match &setup.picture.particles.radius {
+    match &setup.picture.particles.first().radius {
         RadiusRule::Common(radius) => json!(radius),
         RadiusRule::FileOr(_) if survey.has_radii => json!("file"),
         RadiusRule::FileOr(radius) => json!(radius),

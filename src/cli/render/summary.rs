@@ -74,7 +74,7 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(text) = color_text(setup, survey) {
         message!("{text}");
     }
-    let styles = setup.picture.particles.styles.iter();
+    let styles = setup.picture.particles.others().iter();
     for style in styles.filter(|style| !style.shares_colors) {
         if let Some(text) = map_text(&style.color) {
             message!("style `{}`: {text}", style.name);
@@ -97,9 +97,9 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
 /// Describes the colours that follow from attributes.
 fn color_text(setup: &Setup, survey: &Survey) -> Option<String> {
     let rules = &setup.picture.particles;
-    match (&rules.color, &survey.rgb) {
+    match (&rules.first().color, &survey.rgb) {
         // All particles have a style
-        _ if !rules.styles.is_empty() && survey.color.is_none() => None,
+        _ if rules.is_divided() && survey.color.is_none() => None,
         (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) => {
             Some(format!("colour by the RGB attribute `{name}` ({})", rgb.encoding.name()))
         }
@@ -164,7 +164,7 @@ pub(in crate::cli) fn parts_text(sequence: &Sequence) -> Option<String> {
 
 /// Describes the radius.
 pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
-    match &setup.picture.particles.radius {
+    match &setup.picture.particles.first().radius {
         RadiusRule::Common(radius) => format!("radius {radius}"),
         RadiusRule::FileOr(_) if survey.has_radii => "radius from the files".to_owned(),
         RadiusRule::FileOr(radius) => {
@@ -241,7 +241,7 @@ const DOUBTFUL: f64 = 10.0;
 
 /// Says that a given radius is far from the spacing of the particles, if it is.
 fn doubtful_radius(setup: &Setup, survey: &Survey) -> Option<String> {
-    let RadiusRule::Common(radius) = setup.picture.particles.radius else {
+    let RadiusRule::Common(radius) = setup.picture.particles.first().radius else {
         return None;
     };
     let spacing = f64::from(survey.radius?);

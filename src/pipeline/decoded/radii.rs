@@ -6,7 +6,7 @@ use spherule_formats::{Attribute, Radius, is_radius};
 
 use super::super::SharedFrame;
 use super::super::load_error::LoadError;
-use super::super::setup::{ParticleRules, RadiusRule, Setup};
+use super::super::setup::{RadiusRule, Setup};
 use super::super::styles::StyleRanges;
 use super::{attribute, magnitudes};
 use crate::scene::RadiusTable;
@@ -27,12 +27,15 @@ pub(super) fn radii(
     ranges: &StyleRanges,
     file: &str,
 ) -> Result<FrameRadii, LoadError> {
-    let ParticleRules { radius, styles, .. } = &setup.picture.particles;
-    let mut all = radii_of(setup, (radius, 1.0), frame, ranges.first(), file)?;
-    for (index, style) in styles.iter().enumerate() {
+    let of = |index: usize| {
+        let style = &setup.picture.particles.styles[index];
+        let rule = (&style.radius, style.radius_factor);
+        radii_of(setup, rule, frame, ranges.of(index), file)
+    };
+    let mut all = of(0)?;
+    for index in 1..setup.picture.particles.styles.len() {
         // Append those of the style; each particle has its own unless all are alike
-        let (rule, range) = ((&style.radius, style.radius_factor), ranges.of(index));
-        let own = radii_of(setup, rule, frame, range.clone(), file)?;
+        let (own, range) = (of(index)?, ranges.of(index));
         (all.raised, all.unknown) = (all.raised + own.raised, all.unknown + own.unknown);
         all.radius = match (all.radius, own.radius) {
             (Radius::Common(a), Radius::Common(b)) if a == b => Radius::Common(a),

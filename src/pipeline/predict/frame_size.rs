@@ -99,7 +99,7 @@ impl FrameSize {
 /// before and after it would have.
 fn surface_at(setup: &Setup, index: usize, particles: u64) -> Option<SurfaceSize> {
     let picture = &setup.picture;
-    let radius = match picture.particles.radius {
+    let radius = match picture.particles.first().radius {
         RadiusRule::Common(radius) | RadiusRule::FileOr(radius) => Some(radius),
         RadiusRule::Attribute { .. } | RadiusRule::Table { .. } => None,
     };

@@ -52,8 +52,8 @@ impl<'a> MemoryModel<'a> {
         let known = setup.run.weight.unwrap_or_default();
         Self {
             setup,
-            own_radii: match setup.picture.particles.radius {
-                _ if !setup.picture.particles.styles.is_empty() => true,
+            own_radii: match setup.picture.particles.first().radius {
+                _ if setup.picture.particles.is_divided() => true,
                 RadiusRule::Common(_) => false,
                 RadiusRule::FileOr(_) => known.own_radii,
                 RadiusRule::Attribute { .. } | RadiusRule::Table { .. } => true,

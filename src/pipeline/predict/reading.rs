@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use spherule_formats::native::Access;
 
 use super::super::bonds::MAX_BONDS_EACH;
-use super::super::setup::ColorRule;
 use super::{FrameSize, MemoryModel};
 use crate::surface::SurfaceBytes;
 use crate::surface::mesh::MeshTree;
@@ -36,7 +35,7 @@ impl MemoryModel<'_> {
             [rods, style.look.color.as_ref().map_or(0, |_| trails)]
         });
         let styles = picture.particles.styles.iter().filter_map(|style| style.bonds.as_ref());
-        let bonds = picture.things.bonds.iter().chain(styles).map(|_| {
+        let bonds = styles.map(|_| {
             let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);
             [rods, frame.particles]
         });
@@ -119,11 +118,11 @@ impl MemoryModel<'_> {
     /// Bytes of the places of particles in their file, if some of them are not drawn.
     fn file_indices(&self, frame: &FrameSize) -> u64 {
         let rules = &self.setup.picture.particles;
-        match (rules.selection.is_all(), rules.division.is_one()) {
-            (true, true) => 0,
-            (false, true) => 4 * frame.particles,
+        match (rules.selection.is_all(), rules.is_divided()) {
+            (true, false) => 0,
+            (false, false) => 4 * frame.particles,
             // The groups of particles, and their order
-            (_, false) => 10 * frame.particles,
+            (_, true) => 10 * frame.particles,
         }
     }
 
@@ -152,16 +151,15 @@ impl MemoryModel<'_> {
         let channels = self.setup.picture.render.channels;
         let rules = &self.setup.picture.particles;
         let styles = &rules.styles;
-        let colors = styles.iter().map(|style| &style.color).chain([&rules.color]);
-        let color = colors.map(ColorRule::bytes).collect::<BTreeSet<u64>>().into_iter().sum();
-        let has_opacities = rules.opacity.is_by_particle()
-            || styles.iter().any(|style| style.opacity.is_by_particle());
+        let colors = styles.iter().map(|style| style.color.bytes());
+        let color = colors.collect::<BTreeSet<u64>>().into_iter().sum();
+        let has_opacities = styles.iter().any(|style| style.opacity.is_by_particle());
         // Particles that are moved need an explicit id.
         let picture = &self.setup.picture;
         let has_ids = self.has_ids
             || picture.surface.spray
             || !rules.selection.is_all()
-            || !rules.division.is_one();
+            || rules.is_divided();
         let ids = picture.needs_ids() && has_ids;
         let parts = [
             (true, color),

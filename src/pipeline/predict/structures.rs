@@ -34,7 +34,7 @@ impl MemoryModel<'_> {
 
     /// The tree of a body.
     fn body_tree(&self, particles: u64) -> BuildBytes {
-        let values = self.setup.picture.particles.color.is_by_particle();
+        let values = self.setup.picture.particles.first().color.is_by_particle();
         let count = usize::try_from(particles).unwrap_or(usize::MAX);
         let settings = self.setup.build_settings(count, values);
         predicted_bytes(&settings, particles, self.own_radii)
@@ -122,7 +122,7 @@ impl MemoryModel<'_> {
     fn smooth(&self, frame: &FrameSize) -> SurfaceBytes {
         let surface = &self.setup.picture.surface;
         let channels = self.setup.picture.render.channels;
-        let is_colored = self.setup.picture.particles.color.is_by_particle();
+        let is_colored = self.setup.picture.particles.first().color.is_by_particle();
         let keeps = surface.exact || channels.needs_particles() || is_colored;
         match frame.surface.and_then(|surface| surface.grid) {
             Some(grid) => grid.bytes(keeps),

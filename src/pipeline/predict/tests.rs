@@ -178,7 +178,8 @@ fn arrows_trails_and_bonds_are_counted() {
     let trails = alone(&setup);
     assert!(trails.total() >= none.total() + each(5, 60), "{none}\n{trails}");
     setup.picture.things.trails.clear();
-    setup.picture.things.bonds = Some(BondStyle { rule: BondRule::Distance(1.0), look: LOOK });
+    setup.picture.particles.styles[0].bonds =
+        Some(BondStyle { rule: BondRule::Distance(1.0), look: LOOK });
     let bonds = alone(&setup);
     assert!(bonds.total() >= none.total() + each(MAX_BONDS_EACH, 60), "{none}\n{bonds}");
 }
