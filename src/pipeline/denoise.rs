@@ -2,12 +2,21 @@
 
 use std::time::Instant;
 
+use super::renderer::TracedFrame;
 use super::setup::Setup;
 use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::render::{Film, FilmPlane};
 
+impl TracedFrame {
+    /// Denoises the picture if the setup says so.
+    pub(super) fn denoise(&mut self, setup: &Setup) -> Result<(), DenoiseError> {
+        self.report.seconds.denoise = denoise_film(setup, &mut self.film)?;
+        Ok(())
+    }
+}
+
 /// Denoises `film` if the setup says so. Returns the time, seconds.
-pub(super) fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
+fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
     // Without settings, or without features to compare, there is nothing to do
     let (Some(settings), Some(odd)) = (&setup.picture.denoise, &film.odd) else {
         return Ok(0.0);

@@ -18,11 +18,16 @@ const IMAGE_SECONDS: f64 = 4e-3;
 /// Seconds of one thread per ray in a frame of few particles.
 const RAY_SECONDS: f64 = 2.5e-7;
 /// The same of a GPU, and its seconds per pixel until the host has read the picture. Time for denoising is not counted:
-/// the threads that encode compete with it.
+/// all threads share it.
 const DEVICE_RAY_SECONDS: f64 = 7e-10;
 const DEVICE_PIXEL_SECONDS: f64 = 1e-8;
 
 impl Setup {
+    /// Whether a picture is denoised by the stage that encodes it: the processor is free while a GPU traces the next one.
+    pub(super) const fn denoises_when_encoding(&self) -> bool {
+        matches!(self.picture.renderer, RendererKind::Gpu)
+    }
+
     /// Number of images to encode at the same time, so that encoding keeps up with tracing.
     pub(super) fn useful_encoders(&self) -> u32 {
         let render = &self.picture.render;

@@ -10,7 +10,6 @@ use spherule_gpu::{
     bytes_per_pixel, missing, ray_counts, spheres_within, tree_bytes,
 };
 
-use super::denoise::denoise_film;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{OpacityRule, RadiusRule, Setup};
@@ -233,7 +232,7 @@ impl FrameRenderer for GpuRenderer {
         })
     }
 
-    fn render(
+    fn trace(
         &mut self,
         setup: &Setup,
         frame: &BuiltFrame,
@@ -245,7 +244,6 @@ impl FrameRenderer for GpuRenderer {
         let memory = MemoryUse::now();
         let mut report = frame.report.clone();
         report.seconds.trace = start.elapsed().as_secs_f64();
-        report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = ray_counts(&cost).into();
         report.build = BuildSummary {
             structure: "lbvh".to_owned(),

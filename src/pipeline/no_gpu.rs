@@ -50,7 +50,7 @@ impl FrameRenderer for GpuRenderer {
         Self::refuse()
     }
 
-    fn render(
+    fn trace(
         &mut self,
         _: &Setup,
         _: &BuiltFrame,

@@ -118,23 +118,38 @@ pub trait FrameRenderer: Send + Sync {
     /// The frame cannot be rendered: damaged nodes, or a surface that does not fit.
     fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError>;
 
-    /// Renders `frame`, which must be the one prepared last. It can be rendered again, also with other settings of what
-    /// does not belong to its particles.
+    /// Renders `frame`, which must be the one prepared last, and leaves its noise. It can be rendered again, also with
+    /// other settings of what does not belong to its particles.
     ///
     /// # Errors
     /// [`crate::render::RenderError::Interrupted`] if `stop` is raised, [`TraceError::File`] if a native frame
     /// changed in the meantime; all other errors are of settings that are checked in advance.
-    fn render(
+    fn trace(
         &mut self,
         setup: &Setup,
         frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError>;
 
+    /// The same, and denoises the picture if the settings say so.
+    ///
+    /// # Errors
+    /// Same as [`Self::trace`].
+    fn render(
+        &mut self,
+        setup: &Setup,
+        frame: &BuiltFrame,
+        stop: &dyn Stop,
+    ) -> Result<TracedFrame, TraceError> {
+        let mut traced = self.trace(setup, frame, stop)?;
+        traced.denoise(setup)?;
+        Ok(traced)
+    }
+
     /// Renders only the planes of `frame`, which must be the one prepared last.
     ///
     /// # Errors
-    /// Same as [`Self::render`].
+    /// Same as [`Self::trace`].
     fn image(
         &self,
         setup: &Setup,

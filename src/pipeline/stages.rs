@@ -14,7 +14,8 @@ use super::encode::{lock_peaks, write_frame};
 use super::read_threads::ReadThreads;
 use super::record::{AtEncoder, EncodedFrame, NotEncoded, StagedFrame, ToEncoders};
 use super::{
-    FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TracedFrame, load_frame, renderer_of,
+    FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TraceError, TracedFrame, load_frame,
+    renderer_of,
 };
 use crate::render::{Film, Stop};
 use crate::report::FrameReport;
@@ -126,7 +127,13 @@ impl TraceStage<'_> {
                 if let Ok(film) = spare.try_recv() {
                     tracer.recycle(film);
                 }
-                let trace = || tracer.render(self.setup, &frame, &self.stop);
+                let trace = || {
+                    if self.setup.denoises_when_encoding() {
+                        tracer.trace(self.setup, &frame, &self.stop)
+                    } else {
+                        tracer.render(self.setup, &frame, &self.stop)
+                    }
+                };
                 catch_panic(|| Ok(in_pool(trace)?)).map_err(failure)
             });
             if traced.is_err() {
@@ -147,7 +154,7 @@ impl TraceStage<'_> {
     }
 }
 
-/// The third stage: encodes images and publishes their files, several at the same time.
+/// The third stage: encodes images and publishes their files, several at the same time. Those of a GPU are denoised before.
 pub(super) struct EncodeStage<'a> {
     pub(super) setup: &'a Setup,
     pub(super) context: &'a RunContext<'a, FrameReport>,
@@ -181,12 +188,17 @@ impl EncodeStage<'_> {
     }
 
     /// Writes the image, and returns its planes to the tracer.
-    fn write(&self, frame: TracedFrame) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
+    fn write(&self, mut frame: TracedFrame) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
         let (number, outputs) = (frame.task.frame, frame.task.outputs());
         if self.maps_files {
             lock_peaks(self.peaks).use_samples_only();
         }
-        let write = || Ok(write_frame(self.setup, frame, self.peaks)?);
+        let write = || {
+            if self.setup.denoises_when_encoding() {
+                in_pool(|| frame.denoise(self.setup)).map_err(TraceError::from)?;
+            }
+            Ok(write_frame(self.setup, frame, self.peaks)?)
+        };
         let (report, film) =
             catch_panic(write).map_err(|error: ImageError| error.into_failure(number))?;
         if let Some(films) = &self.films {

@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use spherule_files::memory::MemoryUse;
 
 use super::decoded::DecodedFrame;
-use super::denoise::denoise_film;
 use super::gpu::GpuRenderer;
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
@@ -90,12 +89,12 @@ impl FrameRenderer for CpuRenderer {
         self.film = film;
     }
 
-    /// Renders `frame`, which must be the one built last.
+    /// Renders `frame`, which must be the one built last, and leaves its noise.
     ///
     /// # Errors
     /// [`crate::render::RenderError::Interrupted`] if `stop` is raised, [`TraceError::File`] if a native frame
     /// changed in the meantime. All other errors are of settings that are checked in advance.
-    fn render(
+    fn trace(
         &mut self,
         setup: &Setup,
         frame: &BuiltFrame,
@@ -108,11 +107,10 @@ impl FrameRenderer for CpuRenderer {
         let memory = MemoryUse::now();
         // Name its objects while the particles are there
         let texts = matte_attributes(setup, frame);
-        // Denoise it, and complete the report
+        // Complete the report
         let mut report = frame.report.clone();
         report.seconds.trace = seconds(start.elapsed());
         report.clamped_light = rays.lost.part(&film.color, setup.picture.render.samples);
-        report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = rays.into();
         Ok(TracedFrame {
             camera: setup.camera_at(frame.task.frame)?,
@@ -129,7 +127,7 @@ impl FrameRenderer for CpuRenderer {
     /// Renders only the planes of `frame`, which must be the one built last.
     ///
     /// # Errors
-    /// Same as [`Self::render`].
+    /// Same as [`Self::trace`].
     fn image(
         &self,
         setup: &Setup,

@@ -184,11 +184,12 @@ impl MemoryModel<'_> {
         // Count the images that exist at this time
         let Neighbours { encoders, are_slow } = place.neighbours;
         let encoded = place.before.min(encoders);
+        let at_once = if self.setup.denoises_when_encoding() { encoded.max(1) } else { 1 };
         let filtering = denoise::predicted_bytes(render.width, render.height, &settings, threads);
         MemoryNeed {
             program: place.idle.program,
             reading: if are_slow { tracing.reading } else { self.next_kept(place) },
-            images: self.film() * (1 + encoded) + filtering,
+            images: self.film() * (1 + encoded) + at_once * filtering,
             encoding: if are_slow || encoders > 1 {
                 tracing.encoding
             } else {
