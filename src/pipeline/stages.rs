@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 
+use rayon::ThreadPool;
 use spherule_files::memory::MemoryPeaks;
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{
@@ -93,9 +94,20 @@ pub(super) struct TraceStage<'a> {
     pub(super) setup: &'a Setup,
     pub(super) context: &'a RunContext<'a, FrameReport>,
     pub(super) stop: DropFrame<'a>,
+    /// Its own threads, if pictures are denoised while others are traced: in the common pool, its tasks would wait for
+    /// those of the denoiser, and the device for them.
+    pub(super) threads: Option<ThreadPool>,
 }
 
 impl TraceStage<'_> {
+    /// Runs `work` on the threads of this stage.
+    fn in_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        match &self.threads {
+            Some(threads) => threads.install(work),
+            None => in_pool(work),
+        }
+    }
+
     /// The neighbouring stages end when this one does, because it owns its ends of all channels.
     pub(super) fn run(
         &self,
@@ -115,7 +127,7 @@ impl TraceStage<'_> {
             let built = result.and_then(|frame| {
                 self.context.report_stage(number, "tracing");
                 let build = || tracer.prepare(self.setup, frame);
-                catch_panic(|| Ok(in_pool(build)?)).map_err(failure)
+                catch_panic(|| Ok(self.in_pool(build)?)).map_err(failure)
             });
             if let Some(is_built) = &is_built {
                 // The reader may have ended
@@ -134,7 +146,7 @@ impl TraceStage<'_> {
                         tracer.render(self.setup, &frame, &self.stop)
                     }
                 };
-                catch_panic(|| Ok(in_pool(trace)?)).map_err(failure)
+                catch_panic(|| Ok(self.in_pool(trace)?)).map_err(failure)
             });
             if traced.is_err() {
                 if self.stop.is_raised() {

@@ -88,11 +88,10 @@ impl MemoryModel<'_> {
         // Count the threads, including those for reading
         let threads = rayon::current_num_threads() as u64;
         let has_read_pool = [Some(frame), after].into_iter().flatten().any(FrameSize::needs_many);
+        let has_device_pool = self.setup.denoises_when_encoding();
+        let pools = 1 + u64::from(has_read_pool) + u64::from(has_device_pool);
         MemoryNeed {
-            program: PROGRAM
-                + environment
-                + picture
-                + THREAD * threads * if has_read_pool { 2 } else { 1 },
+            program: PROGRAM + environment + picture + THREAD * threads * pools,
             reading: shared(frame).max(self.retained(frame)),
             ..MemoryNeed::default()
         }
