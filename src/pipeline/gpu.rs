@@ -12,7 +12,7 @@ use spherule_gpu::{
 
 use super::load::{LoadedFrame, LoadedParticles};
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
-use super::setup::{OpacityRule, RadiusRule, Setup};
+use super::setup::{OpacityRule, ParticleStyle, RadiusRule, Setup, StyleForm};
 use super::shading::particle_shading;
 use super::surface::spheres;
 use crate::render::{
@@ -20,6 +20,7 @@ use crate::render::{
 };
 use crate::report::FrameReport;
 use crate::report::frame::{BuildSummary, DeviceSummary};
+use crate::scene::Material;
 use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::SurfaceKind;
 
@@ -121,7 +122,8 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
         (rules.first().opacity != OpacityRule::OPAQUE)
             .then(|| ("material.opacity", "opacities below 1".to_owned())),
-        rules.is_divided().then(|| ("style", "styles".to_owned())),
+        (!rules.others().iter().all(|style| is_like_first(setup, style)))
+            .then(|| ("style", "styles that differ in more than radii and colours".to_owned())),
         (!rules.cut.is_everywhere()).then(|| ("clip", "particles that are cut".to_owned())),
         (!things.meshes.is_empty()).then(|| ("mesh", "meshes".to_owned())),
         (things.cell.is_some()).then(|| ("cell", "the simulation cell".to_owned())),
@@ -132,6 +134,17 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     .into_iter()
     .flatten()
     .next()
+}
+
+/// Whether the particles of a style are opaque spheres with the material of the others.
+fn is_like_first(setup: &Setup, style: &ParticleStyle) -> bool {
+    let scene = &setup.picture.scene;
+    let own = scene.material(style.material);
+    let usual = scene.particle_material();
+    matches!(style.form, StyleForm::Spheres)
+        && style.opacity == OpacityRule::OPAQUE
+        && style.bonds.is_none()
+        && *own == Material { owner: own.owner, ..*usual }
 }
 
 /// Whether a job that may choose its device is rendered on a GPU; `particles` are those of its largest frame.
@@ -179,9 +192,11 @@ fn key_of(missing: Missing) -> &'static str {
 /// Memory of the device for a frame with that many particles, bytes.
 pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
     let picture = &setup.picture;
-    let is_common = matches!(picture.particles.first().radius, RadiusRule::Common(_));
+    let rules = &picture.particles;
+    let is_common = matches!(rules.first().radius, RadiusRule::Common(_)) && !rules.is_divided();
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
-    let colors = if picture.particles.first().color.is_by_particle() { 12 * particles } else { 0 };
+    let has_colors = rules.first().color.is_by_particle() || rules.is_divided();
+    let colors = if has_colors { 12 * particles } else { 0 };
     let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
     let has_paths = picture.render.integrator == IntegratorKind::Path;
     let of_pixel = bytes_per_pixel(has_paths, lights, picture.render.has_features);

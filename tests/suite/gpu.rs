@@ -91,6 +91,21 @@ mod on_a_device {
         assert_equal(&workshop, ["gpu", "cpu"]);
     }
 
+    #[test]
+    fn styles_may_differ_in_radii_and_colors() {
+        let Some(workshop) = workshop_with_device() else { return };
+        let style = ["--style", "x > 0.5: spheres, radius 0.03, color red"];
+        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
+            workshop.render_to(out, &with(&[device, &style].concat())).expect(0);
+        }
+        assert_equal(&workshop, ["gpu", "cpu"]);
+        let refused = [&DEVICE[..], &["--style", "x > 0.5: spheres, opacity 0.5"]].concat();
+        workshop
+            .render_to("refused", &with(&refused))
+            .expect(2)
+            .prints("styles that differ in more");
+    }
+
     /// A device that is a program on the CPU is taken only where it is asked for.
     #[test]
     fn a_device_is_chosen_where_it_suits() {
