@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use spherule_files::memory::MemoryUse;
 use spherule_gpu::{
-    AdapterSummary, Arithmetic, Checks, Cost, Device, GpuError, Missing, SceneError, SceneRenderer,
-    bytes_per_pixel, missing, ray_counts, spheres_within, tree_bytes,
+    AdapterSummary, Arithmetic, Checks, Cost, Device, GpuError, MAX_FINISHES, Missing, SceneError,
+    SceneRenderer, bytes_per_pixel, missing, ray_counts, spheres_within, tree_bytes,
 };
 
 use super::load::{LoadedFrame, LoadedParticles};
@@ -20,8 +20,8 @@ use crate::render::{
 };
 use crate::report::FrameReport;
 use crate::report::frame::{BuildSummary, DeviceSummary};
-use crate::scene::Material;
 use crate::scene::material::DEFAULT_COLOR;
+use crate::scene::{Finish, Material};
 use crate::surface::SurfaceKind;
 
 /// The number of the adapter that the user chose.
@@ -122,8 +122,10 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
         (rules.first().opacity != OpacityRule::OPAQUE)
             .then(|| ("material.opacity", "opacities below 1".to_owned())),
-        (!rules.others().iter().all(|style| is_like_first(setup, style)))
-            .then(|| ("style", "styles that differ in more than radii and colours".to_owned())),
+        (rules.styles.len() > MAX_FINISHES)
+            .then(|| ("style", format!("more than {MAX_FINISHES} styles"))),
+        (!rules.others().iter().all(|style| is_plain(setup, style)))
+            .then(|| ("style", "other styles than opaque spheres".to_owned())),
         (!rules.cut.is_everywhere()).then(|| ("clip", "particles that are cut".to_owned())),
         (!things.meshes.is_empty()).then(|| ("mesh", "meshes".to_owned())),
         (things.cell.is_some()).then(|| ("cell", "the simulation cell".to_owned())),
@@ -136,15 +138,27 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     .next()
 }
 
-/// Whether the particles of a style are opaque spheres with the material of the others.
-fn is_like_first(setup: &Setup, style: &ParticleStyle) -> bool {
-    let scene = &setup.picture.scene;
-    let own = scene.material(style.material);
-    let usual = scene.particle_material();
+/// Whether the particles of a style are opaque spheres, whose material differs from that of others only in how paths leave
+/// it.
+fn is_plain(setup: &Setup, style: &ParticleStyle) -> bool {
+    let picture = &setup.picture;
+    let own = picture.scene.material(style.material);
+    let usual = picture.scene.particle_material();
+    let is_known = match own.finish {
+        Finish::Matte | Finish::Plastic { .. } | Finish::Metal { .. } => true,
+        Finish::Foam | Finish::Pane => false,
+    };
+    let constants = |material: &Material| {
+        let Material { ambient, diffuse, specular, shininess, reflection, ior, .. } = *material;
+        ([ambient, diffuse, specular, shininess, reflection, ior], material.fresnel)
+    };
+    let is_traced = picture.render.integrator == IntegratorKind::Path;
     matches!(style.form, StyleForm::Spheres)
         && style.opacity == OpacityRule::OPAQUE
         && style.bonds.is_none()
-        && *own == Material { owner: own.owner, ..*usual }
+        && is_known
+        && own.transmission == 0.0
+        && (is_traced || constants(own) == constants(usual))
 }
 
 /// Whether a job that may choose its device is rendered on a GPU; `particles` are those of its largest frame.

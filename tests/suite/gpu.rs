@@ -92,18 +92,25 @@ mod on_a_device {
     }
 
     #[test]
-    fn styles_may_differ_in_radii_and_colors() {
+    fn styles_of_spheres_are_those_of_the_cpu() {
         let Some(workshop) = workshop_with_device() else { return };
-        let style = ["--style", "x > 0.5: spheres, radius 0.03, color red"];
-        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
-            workshop.render_to(out, &with(&[device, &style].concat())).expect(0);
+        let whitted = with(&["--style", "x > 0.5: spheres, radius 0.03, color red"]);
+        let paths = [
+            "--style",
+            "x > 1: spheres, radius 0.03, color gold, material { type = \"metal\", roughness = 0.3 }",
+            "--style",
+            "x > 0.5: spheres, color red, material { type = \"plastic\" }",
+            "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\"]",
+        ];
+        for (number, look) in [&whitted[..], &paths].into_iter().enumerate() {
+            let [gpu, cpu] = ["gpu", "cpu"].map(|device| format!("{device}{number}"));
+            for (out, device) in [(&gpu, &DEVICE[..]), (&cpu, &["--device=cpu"])] {
+                workshop.render_to(out, &[look, device].concat()).expect(0);
+            }
+            assert_equal(&workshop, [&gpu, &cpu]);
         }
-        assert_equal(&workshop, ["gpu", "cpu"]);
         let refused = [&DEVICE[..], &["--style", "x > 0.5: spheres, opacity 0.5"]].concat();
-        workshop
-            .render_to("refused", &with(&refused))
-            .expect(2)
-            .prints("styles that differ in more");
+        workshop.render_to("refused", &with(&refused)).expect(2).prints("other styles than opaque");
     }
 
     /// A device that is a program on the CPU is taken only where it is asked for.

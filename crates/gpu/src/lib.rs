@@ -89,7 +89,7 @@ pub use arithmetic::Arithmetic;
 pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
 pub use lighting::{
-    Catcher, Environment, Finish, Ground, Lighting, Model, Rough, TablePlace, Tables,
+    Catcher, Environment, Finish, Ground, Lighting, MAX_FINISHES, Model, Rough, TablePlace, Tables,
 };
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,

@@ -2,6 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// Maximum number of groups of spheres that reflect light in different ways.
+pub const MAX_FINISHES: usize = 64;
+
 /// How light is transported.
 #[derive(Debug, Clone, Copy)]
 pub enum Model<'a> {
@@ -34,8 +37,9 @@ pub struct Lighting {
     pub is_environment_visible: bool,
     /// The ground.
     pub ground: Option<Ground>,
-    /// How the spheres reflect light.
-    pub finish: Finish,
+    /// How the spheres reflect light, by the index of the first of each group; at least one, and at most
+    /// [`MAX_FINISHES`].
+    pub finishes: Vec<(u32, Finish)>,
     /// All tables and pixels that [`TablePlace`]s refer to.
     pub tables: Tables,
 }
@@ -129,7 +133,7 @@ pub struct Rough {
 
 /// The uniform `SceneUniform` of the shaders.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct SceneUniform {
     axis_right: [f32; 3],
     catcher_strength: f32,
@@ -154,11 +158,32 @@ pub(crate) struct SceneUniform {
     image: u32,
     is_environment_visible: u32,
     zeros: [u32; 2],
-    finish: u32,
+    finish_count: u32,
+    is_ambient: u32,
+    more_zeros: [u32; 2],
+    finishes: [FinishUniform; MAX_FINISHES],
+    harmonics: [[f32; 4]; 9],
+}
+
+/// The structure `Finish` of the shaders.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct FinishUniform {
+    first: u32,
+    kind: u32,
     alpha: f32,
     albedo_table: u32,
-    is_ambient: u32,
-    harmonics: [[f32; 4]; 9],
+}
+
+impl From<&(u32, Finish)> for FinishUniform {
+    fn from((first, finish): &(u32, Finish)) -> Self {
+        let (kind, rough) = match finish {
+            Finish::Matte => (0, Rough { alpha: 1.0, table: 0 }),
+            Finish::Plastic(rough) => (1, *rough),
+            Finish::Metal(rough) => (2, *rough),
+        };
+        Self { first: *first, kind, alpha: rough.alpha, albedo_table: rough.table }
+    }
 }
 
 impl From<TablePlace> for [u32; 4] {
@@ -169,21 +194,17 @@ impl From<TablePlace> for [u32; 4] {
 
 impl From<&Lighting> for SceneUniform {
     fn from(lighting: &Lighting) -> Self {
-        let (finish, rough) = match lighting.finish {
-            Finish::Matte => (0, Rough { alpha: 1.0, table: 0 }),
-            Finish::Plastic(rough) => (1, rough),
-            Finish::Metal(rough) => (2, rough),
-        };
         let mut uniform = Self {
             bounces: lighting.bounces,
             is_ambient: lighting.ambient_reach.is_some().into(),
             reach: lighting.ambient_reach.unwrap_or_default(),
             is_environment_visible: lighting.is_environment_visible.into(),
-            finish,
-            alpha: rough.alpha,
-            albedo_table: rough.table,
-            ..Self::default()
+            ..Self::zeroed()
         };
+        for (place, finish) in uniform.finishes.iter_mut().zip(&lighting.finishes) {
+            *place = finish.into();
+            uniform.finish_count += 1;
+        }
         if let Some(environment) = &lighting.environment {
             [uniform.axis_right, uniform.axis_back, uniform.axis_up] = environment.axes;
             uniform.environment = environment.table.into();

@@ -10,8 +10,8 @@ use spherule_tracer::render::device::{
     DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, mirrors_see_through, store_pixels,
 };
 use spherule_tracer::render::{
-    Drawing, Film, FilmSampler, IntegratorKind, LostLight, RayCounts, RenderSettings, ShadeSource,
-    Stop,
+    Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
+    RenderSettings, ShadeSource, Stop,
 };
 use spherule_tracer::scene::ground::Pattern;
 use spherule_tracer::scene::{self, Falloff, Fresnel, LightKind, Projection, Scene, background};
@@ -257,7 +257,7 @@ impl SceneRenderer {
         settings: &RenderSettings,
         stop: &dyn Stop,
     ) -> Result<Cost, SceneError> {
-        self.trace(scene, settings, stop)?;
+        self.trace(scene, source, settings, stop)?;
         let store = |pixels: &Pixels<'_>| {
             let share = 1.0 / settings.samples as f32;
             let odd_share = 1.0 / (settings.samples / 2).max(1) as f32;
@@ -284,13 +284,15 @@ impl SceneRenderer {
         stop: &dyn Stop,
     ) -> Result<Cost, SceneError> {
         self.renderer.rebuild(&self.device)?;
-        self.trace(scene, settings, stop)?;
+        let source = ParticleShading::constant(Vec3::ONE);
+        self.trace(scene, &source, settings, stop)?;
         Ok(self.renderer.cost(&self.device)?)
     }
 
     fn trace(
         &mut self,
         scene: &Scene,
+        source: &dyn ShadeSource,
         settings: &RenderSettings,
         stop: &dyn Stop,
     ) -> Result<(), SceneError> {
@@ -313,7 +315,7 @@ impl SceneRenderer {
             has_odd: settings.has_features,
             model: match settings.integrator {
                 IntegratorKind::Whitted => Model::Whitted,
-                IntegratorKind::Path => Model::Paths(self.lighting.of(scene, settings)),
+                IntegratorKind::Path => Model::Paths(self.lighting.of(scene, source, settings)),
             },
             material: material_of(scene),
             lights: &lights,

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
 use spherule_tracer::render::device::{ambient_reach, light_on, reflected_by_white, rough_table};
-use spherule_tracer::render::{IndirectLight, RenderSettings};
+use spherule_tracer::render::{IndirectLight, RenderSettings, ShadeSource};
 use spherule_tracer::scene::ground::Pattern;
 use spherule_tracer::scene::{self, Finish, Scene, environment::TableArrays};
 
@@ -16,17 +16,20 @@ use crate::lighting::{self, Catcher, Ground, Lighting, Rough, TablePlace, Tables
 #[derive(Debug, Clone)]
 struct Key {
     environment: Option<Arc<scene::Environment>>,
-    finish: Finish,
+    /// Those of the groups of spheres.
+    finishes: Vec<Finish>,
     /// The normal of a shadow catcher.
     catcher: Option<Vec3>,
 }
 
 impl Key {
-    fn of(scene: &Scene) -> Self {
+    fn of(scene: &Scene, source: &dyn ShadeSource) -> Self {
         let ground = scene.ground.as_ref();
+        let of_styles = source.styles().iter().map(|style| scene.material(style.material));
+        let materials = std::iter::once(scene.particle_material()).chain(of_styles);
         Self {
             environment: scene.environment.clone().filter(|environment| !environment.is_black()),
-            finish: scene.particle_material().finish,
+            finishes: materials.map(|material| material.finish).collect(),
             catcher: ground.filter(|ground| ground.shadow_catcher.is_some()).map(|g| g.up),
         }
     }
@@ -37,7 +40,7 @@ impl Key {
             (None, None) => true,
             _ => false,
         };
-        environments && self.finish == other.finish && self.catcher == other.catcher
+        environments && self.finishes == other.finishes && self.catcher == other.catcher
     }
 }
 
@@ -48,15 +51,23 @@ pub(crate) struct SceneLighting {
 }
 
 impl SceneLighting {
-    /// The lighting of `scene`. Its ground has no pattern but squares.
-    pub(crate) fn of(&mut self, scene: &Scene, settings: &RenderSettings) -> &Lighting {
-        let key = Key::of(scene);
+    /// The lighting of `scene`, whose spheres have the styles of `source`. Its ground has no pattern but squares.
+    pub(crate) fn of(
+        &mut self,
+        scene: &Scene,
+        source: &dyn ShadeSource,
+        settings: &RenderSettings,
+    ) -> &Lighting {
+        let key = Key::of(scene, source);
         let kept = self.kept.take().filter(|(kept, _)| kept.is_same(&key));
         let (_, lighting) = self.kept.insert(kept.unwrap_or_else(|| {
             let lighting = prepared(&key);
             (key, lighting)
         }));
         // What is cheap follows the scene
+        for (finish, style) in lighting.finishes.iter_mut().skip(1).zip(source.styles()) {
+            finish.0 = style.first;
+        }
         let catcher = lighting.ground.and_then(|ground| ground.catcher);
         lighting.ground = scene.ground.as_ref().map(|ground| ground_of(ground, catcher));
         lighting.is_environment_visible = scene.is_environment_visible;
@@ -75,7 +86,7 @@ fn prepared(key: &Key) -> Lighting {
     let version = VERSIONS.fetch_add(1, Ordering::Relaxed);
     let mut tables = Tables { version, ..Tables::default() };
     let environment = key.environment.as_deref();
-    let finish = finish_of(key.finish, &mut tables);
+    let finishes = key.finishes.iter().map(|finish| (0, finish_of(*finish, &mut tables))).collect();
     let catcher = key.catcher.map(|up| {
         let light = environment.map(|environment| light_on(environment, up));
         Catcher {
@@ -87,7 +98,7 @@ fn prepared(key: &Key) -> Lighting {
     Lighting {
         environment: environment.map(|environment| environment_of(environment, &mut tables)),
         ground: catcher.map(|catcher| Ground { catcher: Some(catcher), ..NO_GROUND }),
-        finish,
+        finishes,
         bounces: 0,
         ambient_reach: None,
         is_environment_visible: false,

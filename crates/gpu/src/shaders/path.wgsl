@@ -31,7 +31,7 @@ const LUMINANCE: vec3<f32> = vec3<f32>(0.2126, 0.7152, 0.0722);
 struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32> }
 
 // A point of an opaque surface
-struct Vertex { normal: vec3<f32>, start: vec3<f32>, base: vec3<f32>, out: vec3<f32>, kind: u32 }
+struct Vertex { normal: vec3<f32>, start: vec3<f32>, base: vec3<f32>, out: vec3<f32>, finish: Finish }
 
 // A shadow ray, if it is needed
 struct Shadow { is_needed: bool, start: vec3<f32>, direction: vec3<f32>, length: f32, radiance: vec3<f32>, coverage: f32 }
@@ -61,7 +61,7 @@ fn seed_at(pixel: u32, bounces: u32) -> Wide {
 
 // The light of a sample that a surface reflects. `competes`: rays of the BSDF find that light, too.
 fn reflected(vertex: Vertex, weight: vec3<f32>, light: LightSample, competes: bool) -> vec3<f32> {
-  let value = eval_bsdf(vertex.kind, vertex.base, vertex.normal, vertex.out, light.direction);
+  let value = eval_bsdf(vertex.finish, vertex.base, vertex.normal, vertex.out, light.direction);
   let other = select(0.0, value.w, competes);
   let factor = select(1.0, 1.0 / (light.pdf + other), light.pdf < FAR);
   return weight * (value.xyz * (light.radiance * factor));
@@ -112,7 +112,7 @@ fn seen_behind(ray: Ray, on_film: vec2<f32>) -> vec3<f32> {
 
 // The shadow rays of a shadow catcher: what is blocked darkens the background by its part of the whole light.
 fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed: Wide) {
-  let white = Vertex(scene.ground_up, above_ground(ground), vec3<f32>(1.0), -ray.direction, MATTE);
+  let white = Vertex(scene.ground_up, above_ground(ground), vec3<f32>(1.0), -ray.direction, OF_GROUND);
   let darkness = scene.catcher_strength * ground.opacity;
   // The light that arrives if nothing is in the way
   var whole = scene.catcher_whole;
@@ -159,7 +159,7 @@ fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide) -> vec3<
 struct Next { is_ray: bool, direction: vec3<f32>, throughput: vec3<f32>, pdf: f32 }
 
 fn next_ray(vertex: Vertex, weight: vec3<f32>, seed: Wide) -> Next {
-  let sample = sample_bsdf(vertex.kind, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, current.sample));
+  let sample = sample_bsdf(vertex.finish, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, current.sample));
   return Next(sample.pdf > 0.0, sample.direction, weight * sample.weight, sample.pdf);
 }
 
@@ -202,10 +202,10 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   var weight = path.throughput;
   if (is_sphere) {
     let surface = surface_at(ray, hit);
-    vertex = Vertex(surface.normal, surface.start, base_color(hit.index), -ray.direction, scene.finish);
+    vertex = Vertex(surface.normal, surface.start, base_color(hit.index), -ray.direction, finish_of(hit.index));
     if (is_first) { keep_nearest(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, path.pixel); }
   } else if (is_ground) {
-    vertex = Vertex(scene.ground_up, above_ground(ground), ground_color(ground.point), -ray.direction, MATTE);
+    vertex = Vertex(scene.ground_up, above_ground(ground), ground_color(ground.point), -ray.direction, OF_GROUND);
     weight *= ground.opacity;
     if (is_first && !is_caught) {
       keep_nearest(depth_of(ray, ground.t), GROUND, scene.ground_up, ground.point, path.pixel);

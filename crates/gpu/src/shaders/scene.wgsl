@@ -17,12 +17,16 @@ struct SceneUniform {
   catcher: Table,
   // First pixel of the image of the environment
   image: u32, is_environment_visible: u32, zero: u32, zero_too: u32,
-  // The material of the spheres: its kind, the width of its microfacets, and the place of its table
-  finish: u32, alpha: f32, albedo_table: u32, is_ambient: u32,
+  finish_count: u32, is_ambient: u32, zero_again: u32, zero_at_last: u32,
+  // How spheres reflect light, by the first index of each group
+  finishes: array<Finish, 64>,
   // Irradiance of the environment
   harmonics: array<vec4<f32>, 9>,
 }
 @group(0) @binding(15) var<uniform> scene: SceneUniform;
+
+// How spheres from an index on reflect light: the kind, the width of its microfacets, and the place of its table
+struct Finish { first: u32, kind: u32, alpha: f32, albedo_table: u32 }
 
 // A table of an environment: its edge in texels, and its places in `texels` and `constants`
 struct Table { side: u32, records: u32, ends: u32, zero: u32 }

@@ -97,7 +97,7 @@ impl<'a> RenderContext<'a> {
             camera_bodies: nested.map(|nested| nested.at(eye)).unwrap_or_default(),
             is_camera_inside: is_body && shapes.particles.is_some_and(contains_eye),
             shapes,
-            has_styles: source.has_styles(),
+            has_styles: !source.styles().is_empty(),
             has_holdouts: scene.materials.iter().any(|material| material.is_holdout),
             source,
             scene,

@@ -36,9 +36,9 @@ pub trait ShadeSource: Sync {
         None
     }
 
-    /// Whether some particles are drawn in a style with a material of its own.
-    fn has_styles(&self) -> bool {
-        false
+    /// The styles of the last particles, with rising indices.
+    fn styles(&self) -> &[StyleShading<'_>] {
+        &[]
     }
 
     /// The material of a particle whose style has its own.
@@ -219,8 +219,8 @@ impl ShadeSource for ParticleShading<'_> {
         Some((name, *parts.get(index as usize)?))
     }
 
-    fn has_styles(&self) -> bool {
-        !self.styles.is_empty()
+    fn styles(&self) -> &[StyleShading<'_>] {
+        &self.styles
     }
 
     fn style(&self, index: u32) -> Option<MaterialId> {
