@@ -14,7 +14,7 @@ use crate::pipeline::{
     RadiusRule, Setup, Things, gpu,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, Environment, Texture};
+use crate::scene::{Bounds, Texture};
 use crate::selection::Division;
 use crate::survey::Survey;
 
@@ -46,7 +46,7 @@ mod styles;
 mod surface;
 
 pub use camera::check_views;
-pub use environment::EnvironmentMap;
+pub use environment::{EnvironmentMap, KeptEnvironment};
 pub use error::ResolveError;
 use error::require_attribute;
 pub use meshes::mesh_settings;
@@ -62,7 +62,7 @@ pub struct SceneInputs<'a> {
     /// The image of the environment, if that is one.
     pub environment: Option<&'a EnvironmentMap>,
     /// Where the environment is kept that was made with these settings, whatever the view.
-    pub made: Option<&'a OnceLock<Environment>>,
+    pub kept: Option<&'a OnceLock<KeptEnvironment>>,
     /// Those of overlays of the type image, in their order.
     pub overlays: &'a [Arc<RgbaPixels>],
     /// The picture on the ground.
