@@ -20,13 +20,13 @@ const REFERENCE_ELEVATION: f64 = 42.0;
 
 /// How much of the differences in brightness is left by day, as an exponent: an eye or camera that has adapted sees a low
 /// sun as dark, but not as much darker as it is.
-const ADAPTED: f64 = 0.5;
+const ADAPTED: f64 = 0.55;
 
 /// The same for a dusk.
-const ADAPTED_TO_DUSK: f64 = 0.08;
+const ADAPTED_TO_DUSK: f64 = 0.05;
 
 /// The part of the light by day where adaptation changes from one to the other.
-const DUSK: f64 = 0.006;
+const DUSK: f64 = 0.012;
 
 /// Sine of the angle below the horizon at which only the ground is left.
 const FADE: f32 = 0.3;
