@@ -89,8 +89,13 @@ impl ClearSky {
     pub fn environment(&self, axes: EnvironmentAxes, scale: Vec3) -> Environment {
         Environment::from_fn(axes, |at| {
             // Below the horizon, fade to the light that the ground reflects
-            let depth = (-at.z / FADE).clamp(0.0, 1.0);
-            self.exposure * scale * self.table.radiance(at).lerp(self.ground, depth)
+            let depth = -at.z / FADE;
+            let radiance = if depth >= 1.0 {
+                self.ground
+            } else {
+                self.table.radiance(at).lerp(self.ground, depth.max(0.0))
+            };
+            self.exposure * scale * radiance
         })
     }
 }
