@@ -14,7 +14,7 @@ use crate::pipeline::{
     PictureMesh, RadiusRule, Setup, StyleForm, Things, gpu,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, Environment, MaterialId, Texture};
+use crate::scene::{Bounds, MaterialId, Texture};
 use crate::selection::Division;
 use crate::survey::Survey;
 
@@ -45,7 +45,7 @@ mod styles;
 mod surface;
 
 pub use camera::check_views;
-pub use environment::EnvironmentMap;
+pub use environment::{EnvironmentMap, KeptEnvironment};
 pub use error::ResolveError;
 use error::require_attribute;
 pub use meshes::mesh_settings;
@@ -61,7 +61,7 @@ pub struct SceneInputs<'a> {
     /// The image of the environment, if that is one.
     pub environment: Option<&'a EnvironmentMap>,
     /// Where the environment is kept that was made with these settings, whatever the view.
-    pub made: Option<&'a OnceLock<Environment>>,
+    pub kept: Option<&'a OnceLock<KeptEnvironment>>,
     /// Those of overlays of the type image, in their order.
     pub overlays: &'a [Arc<RgbaPixels>],
     /// The picture on the ground.

@@ -11,8 +11,8 @@ use crate::manifest::{EnvironmentKind, GROUND_IMAGE, Manifest, OverlayKind, name
 use crate::overlay::RgbaPixels;
 use crate::picture::read_rgba;
 use crate::pipeline::Setup;
-use crate::resolve::{self, EnvironmentMap, SceneInputs, check_views};
-use crate::scene::{Environment, Texture};
+use crate::resolve::{self, EnvironmentMap, KeptEnvironment, SceneInputs, check_views};
+use crate::scene::Texture;
 use crate::survey::Survey;
 use spherule_images::file::ImageReadError;
 
@@ -28,7 +28,7 @@ pub struct SceneFiles {
     overlay_images: OnceLock<Vec<Arc<RgbaPixels>>>,
     meshes: JobMeshes,
     /// The environment of the manifest, if it is kept for other views.
-    environment: Option<Arc<OnceLock<Environment>>>,
+    environment: Option<Arc<OnceLock<KeptEnvironment>>>,
 }
 
 impl SceneFiles {
@@ -74,7 +74,7 @@ impl SceneFiles {
     ) -> Result<Setup, RunError> {
         let inputs = SceneInputs {
             environment: self.environment_image(manifest)?,
-            made: self.environment.as_deref(),
+            kept: self.environment.as_deref(),
             overlays: self.overlay_images(manifest)?,
             ground: self.ground_image(manifest)?,
             meshes: self.meshes.get(manifest, &self.dir, survey)?,

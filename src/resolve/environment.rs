@@ -56,6 +56,14 @@ impl EnvironmentMap {
     }
 }
 
+/// An environment that is kept for other views.
+#[derive(Debug)]
+pub struct KeptEnvironment {
+    environment: Environment,
+    /// Irradiance of the sun of a sky on a surface that faces it, linear RGB.
+    sun: Vec3,
+}
+
 /// Light from infinitely far away.
 #[derive(Debug, Default)]
 pub(super) struct Surroundings {
@@ -90,34 +98,59 @@ pub(super) fn surroundings(
         is_visible: settings.visible,
         group: group_index(manifest, settings.group.as_ref()),
     };
-    // It costs more than all the rest, and only its axes depend on the view
-    let made = |make: &dyn Fn() -> Environment| match inputs.made {
-        Some(known) => known.get_or_init(make).clone().with_axes(axes),
-        None => make(),
-    };
+    let of = |make: &dyn Fn() -> KeptEnvironment| kept(inputs, axes, make);
     let (environment, suns) = match settings.kind {
-        EnvironmentKind::Studio => (made(&|| studio(axes, scale)), Vec::new()),
+        EnvironmentKind::Studio => (of(&|| without_sun(studio(axes, scale))).0, Vec::new()),
         EnvironmentKind::Constant => (Environment::constant(scale), Vec::new()),
         EnvironmentKind::Sky => {
             let direction = sky_direction(settings.sun.elevation, settings.sun.azimuth);
             let (turbidity, albedo) = (settings.turbidity, settings.albedo);
-            let sky = ClearSky::new(&SkySettings { sun: direction, turbidity, albedo });
+            let (environment, irradiance) = of(&|| {
+                let sky = ClearSky::new(&SkySettings { sun: direction, turbidity, albedo });
+                KeptEnvironment { environment: sky.environment(axes, scale), sun: sky.sun() }
+            });
             let half_angle = (0.5 * settings.sun.size).to_radians();
-            let environment = made(&|| sky.environment(axes, scale));
-            (environment, vec![sun(direction, half_angle, sky.sun())])
+            // Below the horizon it is no light
+            let is_up = irradiance != Vec3::ZERO;
+            let light = is_up.then(|| sun(direction, half_angle, irradiance));
+            (environment, light.into_iter().collect())
         }
         EnvironmentKind::Image => {
             let map = inputs.environment.ok_or_else(|| ResolveError::Unsupported {
                 key: "environment.image",
                 what: "the image has not been read".to_owned(),
             })?;
-            let image = || Environment::from_map(axes, &map.reduced, scale);
+            let image = || without_sun(Environment::from_map(axes, &map.reduced, scale));
             let of_map = |own: &MapSun| sun(own.direction, own.half_angle, own.irradiance);
             let suns = map.suns.iter().map(of_map).collect();
-            (made(&image).with_detail(map.detail.clone(), scale), suns)
+            (of(&image).0.with_detail(map.detail.clone(), scale), suns)
         }
     };
     Ok(Surroundings { environment: Some(Arc::new(environment)), suns })
+}
+
+/// The environment around some `axes`, and the irradiance of its sun. It costs more than all the rest of a setup, and only
+/// its axes depend on the view; so it is kept if `inputs` have a place for it.
+fn kept(
+    inputs: &SceneInputs<'_>,
+    axes: EnvironmentAxes,
+    make: &dyn Fn() -> KeptEnvironment,
+) -> (Environment, Vec3) {
+    match inputs.kept {
+        Some(known) => {
+            let KeptEnvironment { environment, sun } = known.get_or_init(make);
+            (environment.clone().with_axes(axes), *sun)
+        }
+        None => {
+            let KeptEnvironment { environment, sun } = make();
+            (environment, sun)
+        }
+    }
+}
+
+/// An environment that is no sky.
+const fn without_sun(environment: Environment) -> KeptEnvironment {
+    KeptEnvironment { environment, sun: Vec3::ZERO }
 }
 
 #[cfg(test)]
@@ -139,7 +172,7 @@ mod tests {
         for kind in [EnvironmentKind::Studio, EnvironmentKind::Constant, EnvironmentKind::Sky] {
             manifest.environment.kind = kind;
             let known = OnceLock::new();
-            let kept = SceneInputs { made: Some(&known), ..SceneInputs::default() };
+            let kept = SceneInputs { kept: Some(&known), ..SceneInputs::default() };
             for eye in [DVec3::NEG_Y, DVec3::new(3.0, 1.0, 2.0)] {
                 let view = CameraView { eye, look_at: DVec3::ZERO, up: DVec3::Z, fov: 30.0 };
                 let of = |inputs: &SceneInputs<'_>| {

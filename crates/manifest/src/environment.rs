@@ -100,9 +100,9 @@ impl Environment {
         keys!(keys:
             /// sky: position of the sun and its apparent diameter, degrees
             ///
-            /// The elevation is above the horizon. The azimuth is 0 at the right of the first view of the camera, and
-            /// 90 on the viewer's side. A size of 0.53 is that of the sun as seen from the earth; a larger one has
-            /// softer shadows.
+            /// The elevation is above the horizon, from -12 (the end of a dusk) to 90. The azimuth is 0 at the right
+            /// of the first view of the camera, and 90 on the viewer's side. A size of 0.53 is that of the sun as seen
+            /// from the earth; a larger one has softer shadows.
             sun => self.sun, affects(Affects::PathTracing);
             /// sky: haze in the air, 1 (none) to 10; 2.5 is a clear day
             turbidity => self.turbidity, from(1), to(10), affects(Affects::Sky);

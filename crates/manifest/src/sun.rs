@@ -9,7 +9,7 @@ use super::value::{Fault, Value};
 /// The sun of a clear sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sun {
-    /// Above the horizon, degrees.
+    /// Above the horizon, degrees. Negative in a dusk.
     pub elevation: f64,
     /// From the right of the first view towards the viewer, degrees.
     pub azimuth: f64,
@@ -26,7 +26,7 @@ impl Sun {
 /// The keys of the table.
 fn keys() -> [Key; 3] {
     let key = |name| Key::new(name, &[]).unit("degrees");
-    [key("elevation").from(0).to(90), key("azimuth"), key("size").above(0).to(90)]
+    [key("elevation").from(-12).to(90), key("azimuth"), key("size").above(0).to(90)]
 }
 
 impl Value for Sun {

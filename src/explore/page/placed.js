@@ -422,6 +422,7 @@ function sunsNow() {
     const rotation = setting("environment.rotation") || 0;
     suns.push({
       key: "sun of the sky", name: "Sun of the sky", elevation: sky.elevation, azimuth: turnOf(sky.azimuth - rotation),
+      lowest: -12, // a dusk
       set: ({ elevation, azimuth }, how) =>
         choose({ "environment.sun": { ...sky, elevation, azimuth: turnOf(azimuth + rotation) } }, how),
     });
@@ -433,7 +434,7 @@ function sunsNow() {
     const azimuth = turnOf(degrees(Math.atan2(dot(to, back), dot(to, right))));
     const elevation = degrees(Math.asin(Math.max(-1, Math.min(1, dot(to, above)))));
     suns.push({
-      key: `sun ${i}`, name: `Light ${i + 1}`, elevation, azimuth,
+      key: `sun ${i}`, name: `Light ${i + 1}`, elevation, azimuth, lowest: 0,
       set: (own, how) => change("light", (list) => { list[i].direction = directionOf(own, { right, back, above }); }, how),
     });
   });
@@ -456,20 +457,20 @@ function sunHandles() {
   if (dial.hidden) return [];
   const radius = dial.clientWidth / 2;
   const middle = [dial.offsetLeft + dial.clientLeft + radius, dial.offsetTop + dial.clientTop + radius];
-  return suns.map(({ key, name, elevation, azimuth, set }) => {
+  return suns.map(({ key, name, elevation, azimuth, lowest, set }) => {
     const out = (radius * (90 - Math.max(0, elevation))) / 90;
     const at = [middle[0] + out * Math.cos(radians(azimuth)), middle[1] + out * Math.sin(radians(azimuth))];
     const text = `elevation ${Math.round(elevation)} degrees, azimuth ${Math.round(azimuth)} degrees`;
     return {
       key, kind: "sun", name: `${name}, ${text}; drag it, or turn it with arrow keys`, at,
-      values: { min: 0, max: 90, now: Math.round(elevation), text },
+      values: { min: lowest, max: 90, now: Math.round(elevation), text },
       begin: () => at,
       drag: (start, by, how) => set(sunAt(add(add(start, by), middle, -1), radius), how),
       press: ({ key: pressed, shiftKey }) => {
         const step = ARROWS[pressed];
         if (!step) return false;
         const [by, down] = step.map((x) => x * (shiftKey ? 1 : 5));
-        set({ elevation: Math.round(Math.max(0, Math.min(90, elevation - down))), azimuth: turnOf(Math.round(azimuth + by)) });
+        set({ elevation: Math.round(Math.max(lowest, Math.min(90, elevation - down))), azimuth: turnOf(Math.round(azimuth + by)) });
         return true;
       },
     };

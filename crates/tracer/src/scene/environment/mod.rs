@@ -12,16 +12,19 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+mod atmosphere;
 mod detail;
 mod distribution;
 mod image;
 mod irradiance;
 mod map;
+mod multiple;
 mod octahedral;
 mod resample;
+mod scattering;
 mod sky;
+mod spectrum;
 mod studio;
-mod sun_spectrum;
 mod suns;
 mod table;
 #[cfg(test)]
