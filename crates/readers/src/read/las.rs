@@ -18,6 +18,7 @@ use spherule_frame::{
 };
 
 mod laz;
+mod times;
 
 /// LAS point clouds.
 pub const FORMAT: Format = Format::new(&Las);
@@ -101,7 +102,7 @@ impl Reader for Las {
         let name = if header.is_compressed { "LAZ" } else { "LAS" };
         let mut notes =
             vec![format!("{name} 1.{}, format of points {}", header.minor, header.format)];
-        if header.is_compressed && header.format > 5 {
+        if header.lacks_times() {
             notes.push("times of compressed points (gps_time) are not read".to_owned());
         }
         let (_, left_out) = header.extra_columns(bytes);
@@ -203,6 +204,11 @@ impl LasHeader {
         Ok(Positions::F64(triples.iter().map(position).collect()))
     }
 
+    /// Whether its times are compressed in a way that is not read.
+    const fn lacks_times(&self) -> bool {
+        self.is_compressed && self.format > 5
+    }
+
     /// The columns beside the coordinates of points that are there.
     fn attributes(&self, bytes: &[u8]) -> Vec<StridedColumn> {
         let (_, class, source, time, color, infrared) = offsets(self.format).unwrap_or_default();
@@ -217,7 +223,7 @@ impl LasHeader {
             ("nir", ScalarType::U16, 1, infrared),
         ];
         let is_there =
-            |name: &str, offset| offset > 0 && !(self.is_compressed && name == "gps_time");
+            |name: &str, offset| offset > 0 && !(self.lacks_times() && name == "gps_time");
         for (name, scalar, components, offset) in
             optional.into_iter().filter(|column| is_there(column.0, column.3))
         {
@@ -435,11 +441,7 @@ mod tests {
         };
         for (place, value, message) in [
             (0, &b"X"[..], "begins with LASF"),
-            (
-                POINT_FORMAT,
-                &[3 | COMPRESSED],
-                "whose times cannot be decoded safely; decompress it",
-            ),
+            (POINT_FORMAT, &[3 | COMPRESSED], "there is no record `laszip encoded`"),
             (POINT_FORMAT, &[11], "formats 0 to 10"),
             (105, &[10, 0], "points of 10 bytes, format 3 has 34"),
             (107, &[255; 4], "4294967295 particles need"),

@@ -7,14 +7,16 @@
 //! The crate allocates what a file says, and panics on some damage. So the items have to be those of the format of points,
 //! lengths are compared with the bytes that are there before it sees them, and panics become errors. It decodes times by
 //! recursion as deep as a file wants, so that damage overflows the stack, which is not an error but an end of the process.
-//! Therefore times of formats 6 to 10, which are a layer, are passed over, and formats 1 and 3 to 5 are refused.
+//! Therefore times of formats 6 to 10, which are a layer, are passed over, and those of others are decoded by `times.rs`.
 
 use std::io::Cursor;
 
+use laz::record::{RecordDecompressor, SequentialPointRecordDecompressor};
 use laz::{
     DecompressionSelection, LasZipDecompressor, LazItem, LazItemRecordBuilder, LazItemType, LazVlr,
 };
 
+use super::times::{Times1, Times2};
 use super::{LasHeader, offsets};
 use crate::read::CUT_SHORT;
 use spherule_files::{Panic, catch_panic};
@@ -50,14 +52,6 @@ pub(super) fn unpack(
     // The result, and a copy of compressed bytes
     let need = header.start.saturating_add(points_len).saturating_add(data.len());
     budget.check(need as u64, "its points, decompressed, are")?;
-    if matches!(header.format, 1 | 3 | 4 | 5) {
-        let what = format!(
-            "a LAZ file with points of format {}, whose times cannot be decoded safely; decompress it (`pdal translate in.laz \
-             out.las`, or `laszip -i in.laz -o out.las`)",
-            header.format
-        );
-        return Err(ParseError::unsupported(what));
-    }
     let settings = Settings::read(bytes, header)?;
     let mut unpacked = bytes.get(..header.start).unwrap_or_default().to_vec();
     unpacked.resize(header.start + points_len, 0);
@@ -69,6 +63,9 @@ pub(super) fn unpack(
     }
     Ok(unpacked)
 }
+
+/// Decodes the points of formats up to 5.
+type StreamDecoder<'a> = SequentialPointRecordDecompressor<'a, Cursor<&'a [u8]>>;
 
 /// How the points are compressed.
 struct Settings {
@@ -147,8 +144,33 @@ impl Settings {
             return Ok(());
         }
         let table = if self.is_one_chunk { 0 } else { TABLE };
-        let body = data.get(table..).unwrap_or_default();
-        self.decode(body, points).map_err(|what| damaged(header.start, &what))
+        let body = Cursor::new(data.get(table..).unwrap_or_default());
+        let chunk = match (self.is_one_chunk, self.vlr.chunk_size() as usize) {
+            (true, _) => points.len(),
+            (false, size) => size.saturating_mul(header.record),
+        };
+        let decoded = catch_panic(|| -> Result<(), DecoderError> {
+            let mut decoder = SequentialPointRecordDecompressor::new(body);
+            for points in points.chunks_mut(chunk) {
+                self.start_chunk(&mut decoder)?;
+                decoder.decompress_many(points)?;
+            }
+            Ok(())
+        });
+        decoded.map_err(|DecoderError(what)| damaged(header.start, &what))
+    }
+
+    /// Makes `decoder` begin anew.
+    fn start_chunk(&self, decoder: &mut StreamDecoder<'_>) -> Result<(), laz::LasZipError> {
+        decoder.reset();
+        for item in self.vlr.items() {
+            match (item.item_type(), item.version()) {
+                (LazItemType::GpsTime, 1) => decoder.add_field_decompressor(Times1::default()),
+                (LazItemType::GpsTime, _) => decoder.add_field_decompressor(Times2::default()),
+                _ => decoder.set_fields_from(&vec![*item])?,
+            }
+        }
+        Ok(())
     }
 
     /// Decodes `points` chunk by chunk.
@@ -187,13 +209,11 @@ impl Settings {
         (count > 0 && len <= bytes.len()).then_some((count, len))
     }
 
-    /// Decodes as many points as `to` has room for.
+    /// Decodes the points of a chunk with layers, as many as `to` has room for.
     fn decode(&self, body: &[u8], to: &mut [u8]) -> Result<(), String> {
         // A table without chunks, so that the crate trusts none
         let mut source = Vec::with_capacity(body.len() + 2 * TABLE);
-        if !self.is_one_chunk {
-            source.extend(((TABLE + body.len()) as u64).to_le_bytes());
-        }
+        source.extend(((TABLE + body.len()) as u64).to_le_bytes());
         source.extend(body);
         source.extend([0; TABLE]);
         let decoded = catch_panic(|| -> Result<(), DecoderError> {
@@ -263,7 +283,7 @@ mod tests {
         read: |bytes, step| FORMAT.read(bytes, step),
     };
 
-    const FORMATS: [u8; 5] = [0, 2, 6, 7, 8];
+    const FORMATS: [u8; 8] = [0, 1, 2, 3, 5, 6, 7, 8];
 
     fn cloud(format: u8) -> Vec<u8> {
         sample(&format!("las/format{format}.laz"))
@@ -276,7 +296,7 @@ mod tests {
             assert_eq!(FORMAT.reader().sniff(&packed), Ok(Confidence::Signature));
             let mut plain = READER.one(&sample(&format!("las/format{format}.las")));
             assert_eq!(plain.positions.len(), 300);
-            plain.attributes.retain(|attribute| attribute.name != "gps_time");
+            plain.attributes.retain(|attribute| format < 6 || attribute.name != "gps_time");
             assert_eq!(READER.one(&packed), plain, "format {format}");
             let notes = FORMAT.reader().notes(&packed);
             assert!(notes[0].starts_with("LAZ 1."), "{notes:?}");
@@ -323,12 +343,7 @@ mod tests {
             (2, stream - 52, b"X", "there is no record `laszip encoded`"),
             (2, 107, &[255, 0, 0, 1], "compressed points in"),
             (2, 107, &[255, 255, 0, 0], "compressed points are damaged"),
-            (
-                2,
-                POINT_FORMAT,
-                &[0x83, 34, 0],
-                "format 3, whose times cannot be decoded safely; decompress",
-            ),
+            (2, POINT_FORMAT, &[0x83, 34, 0], "are not those of the format of points 3"),
             (6, layers, &[2, 0], "the unknown compressor 2"),
             (6, start + 8 + 30, &[0; 4], "a chunk has no points"),
             (6, start + 8 + 30 + 4, &[255; 4], "longer than what is left"),
