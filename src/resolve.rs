@@ -164,7 +164,9 @@ fn setup_on(
         color,
     };
     let looks = styles::Looks {
-        manifest,
+        manifest: &styled.usual,
+        first: &first,
+        first_shares: styled.first_shares,
         survey,
         camera: &placed.camera,
         meshes: &inputs.grain_meshes,

@@ -423,13 +423,18 @@ fn build_key(prepared: &Prepared, frame: i64) -> String {
     let settings = prepared.manifest().settings();
     let others: Vec<_> = settings.into_iter().filter(|(key, _)| !is_shading(key)).collect();
     format!(
-        "{frame} {:?} {:?} {:?} {:?} {:?} {} {others:?}",
+        "{frame} {:?} {:?} {:?} {:?} {:?} {:?} {others:?}",
         picture.origin,
         picture.renderer,
         picture.particles.first().radius,
         picture.files.overlay_values,
         prepared.manifest().render.memory_limit,
-        colored_by(&picture.particles.first().color, picture.renderer),
+        picture
+            .particles
+            .styles
+            .iter()
+            .map(|style| colored_by(&style.color, picture.renderer))
+            .collect::<Vec<_>>(),
     )
 }
 

@@ -122,8 +122,9 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
         (rules.first().opacity != OpacityRule::OPAQUE)
             .then(|| ("material.opacity", "opacities below 1".to_owned())),
+        rules.first().bonds.is_some().then(|| ("bonds", "bonds".to_owned())),
         (rules.styles.len() > MAX_FINISHES)
-            .then(|| ("style", format!("more than {MAX_FINISHES} styles"))),
+            .then(|| ("style", format!("more than {} styles", MAX_FINISHES - 1))),
         (!rules.others().iter().all(|style| is_plain(setup, style)))
             .then(|| ("style", "other styles than opaque spheres".to_owned())),
         (!rules.cut.is_everywhere()).then(|| ("clip", "particles that are cut".to_owned())),
@@ -131,7 +132,6 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
         (things.cell.is_some()).then(|| ("cell", "the simulation cell".to_owned())),
         (!things.arrows.is_empty()).then(|| ("arrows", "arrows".to_owned())),
         (!things.trails.is_empty()).then(|| ("trails", "trails".to_owned())),
-        rules.first().bonds.is_some().then(|| ("bonds", "bonds".to_owned())),
     ]
     .into_iter()
     .flatten()

@@ -236,7 +236,7 @@ fn selected(
     }
     let survivors = selection
         .survivors(&particles)
-        .map_err(|e| unknown_name(&e, file, &particles.attributes))?;
+        .map_err(|e| unknown_name(&e, ("select.where", file), &particles.attributes))?;
     if !division.is_one() {
         return in_order_of_styles(setup, particles, &survivors, file);
     }

@@ -57,10 +57,12 @@ pub enum LoadError {
         value: f64,
     },
     /// It lacks a value that a selection needs.
-    #[error("{file}: select.where: character {column}: no value `{name}`; the file has {has}")]
+    #[error("{file}: {key}: character {column}: no value `{name}`; the file has {has}")]
     UnknownName {
         /// The frame's first file.
         file: String,
+        /// The key of the condition.
+        key: &'static str,
         /// The name.
         name: String,
         /// Its place in the condition, in characters from 1.
@@ -69,10 +71,12 @@ pub enum LoadError {
         has: String,
     },
     /// It lacks a text that a selection compares a value with.
-    #[error("{file}: select.where: character {column}: {what}")]
+    #[error("{file}: {key}: character {column}: {what}")]
     UnknownText {
         /// The frame's first file.
         file: String,
+        /// The key of the condition.
+        key: &'static str,
         /// Its place in the condition, in characters from 1.
         column: usize,
         /// The text, and those that there are.
@@ -144,14 +148,16 @@ pub(super) fn missing_value<C: Named>(
 /// The error for a name in a selection that particles with `attributes` have no value for.
 pub(super) fn unknown_name(
     unknown: &UnknownName,
-    file: &str,
+    (key, file): (&'static str, &str),
     attributes: &[Attribute],
 ) -> LoadError {
     if let Some(what) = unknown.text_fault("") {
-        return LoadError::UnknownText { file: file.to_owned(), column: unknown.column, what };
+        let (file, column) = (file.to_owned(), unknown.column);
+        return LoadError::UnknownText { file, key, column, what };
     }
     LoadError::UnknownName {
         file: file.to_owned(),
+        key,
         name: unknown.name.clone(),
         column: unknown.column,
         has: {

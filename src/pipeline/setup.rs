@@ -561,7 +561,7 @@ impl Setup {
             ),
             (
                 particles.is_divided(),
-                "[[style]] divides a copy of them, 12 bytes per particle and more",
+                "[[style]] and [[material.part]] divide a copy of them, 12 bytes per particle and more",
             ),
             (
                 !arrows.is_empty() || !trails.is_empty() || particles.first().bonds.is_some(),

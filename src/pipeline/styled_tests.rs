@@ -8,9 +8,12 @@ use spherule_formats::{PositionSlice, RawParticles};
 use spherule_frame::{Attribute, AttributeData};
 
 use crate::manifest::Manifest;
-use crate::pipeline::{ImageTask, Setup, trace_particles};
+use crate::pipeline::{
+    BondRule, ColorRule, ImageTask, ParticleStyle, RadiusRule, Setup, trace_particles,
+};
 use crate::render::{Film, FilmPlane};
 use crate::resolve::{Inquiry, SceneInputs, setup};
+use crate::scene::Finish;
 use crate::survey::Survey;
 
 /// Particles of five types in a row of slabs.
@@ -244,4 +247,36 @@ fn grains_are_where_their_particles_are() {
             assert_eq!(*albedo, [1.0, 0.0, 0.0]);
         }
     }
+}
+
+#[test]
+fn what_styles_do_not_say_is_as_in_the_manifest() {
+    // Also beside water, whose settings take the place of those of particles without a style
+    let styles = "material = { type = \"metal\", color = { attribute = \"charge\" } }\n\
+                  [[style]]\nwhere = \"type == 2\"\ndraw = \"smooth\"\nradius = 0.9\ncolor = [0, 0, 1]\n\
+                  material = { type = \"water\" }\n[[style]]\nwhere = \"type == 1\"";
+    let (setup, ..) = rendered(styles);
+    let [water, one, rest] = &setup.picture.particles.styles[..] else { panic!("three styles") };
+    assert_eq!(water.radius, RadiusRule::Common(0.9));
+    for style in [one, rest] {
+        assert_eq!(style.radius, RadiusRule::Common(0.4));
+        let finish = setup.picture.scene.material(style.material).finish;
+        assert!(matches!(finish, Finish::Metal { .. }), "{finish:?}");
+    }
+    // They have one scale, without the water
+    let range = |style: &ParticleStyle| match &style.color {
+        ColorRule::Attribute { map, .. } => map.range().map(|(range, _)| range),
+        _ => None,
+    };
+    assert_eq!(range(one), range(rest));
+    assert!(range(one).is_some_and(|[low, high]| low < 5.0 && high > 170.0), "{:?}", range(one));
+}
+
+#[test]
+fn parts_keep_the_bonds_of_all_particles() {
+    let (setup, ..) = rendered("[bonds]\nfind = 1.01\n[[material.part]]\nparts = [2]");
+    let styles = &setup.picture.particles.styles;
+    assert_eq!(styles.len(), 2);
+    let rules: Vec<_> = styles.iter().map(|style| style.bonds.as_ref().map(|b| &b.rule)).collect();
+    assert_eq!(rules, [Some(&BondRule::Distance(1.01)); 2]);
 }

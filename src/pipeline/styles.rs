@@ -9,8 +9,10 @@ use spherule_formats::{ParticleFrame, Radius, RawParticles};
 use super::SharedFrame;
 use super::load_error::{LoadError, unknown_name};
 use super::setup::{ParticleRules, Setup, StyleForm};
+use crate::scene::{Material, Owner};
 use crate::selection::Divided;
 use crate::surface::SurfaceKind;
+use crate::survey::PART_NAMES;
 
 /// The particles of the styles of a frame.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -65,7 +67,7 @@ pub(super) fn in_order_of_styles(
     let Divided { order, ends } = rules
         .division
         .divide(&particles, survivors)
-        .map_err(|e| unknown_name(&e, file, &particles.attributes))?;
+        .map_err(|e| unknown_name(&e, (key_of(setup, &e.name), file), &particles.attributes))?;
     let count = particles.positions.len();
     let frame = ParticleFrame::from_selected(particles, order.clone(), setup.picture.origin);
     // Particles that are not finite are gone; the others have kept their order
@@ -81,6 +83,16 @@ pub(super) fn in_order_of_styles(
         _ => ends,
     };
     Ok((frame.with_positions(Cow::Owned), StyleRanges { ends }))
+}
+
+/// The key of the condition that has a value of this name.
+fn key_of(setup: &Setup, name: &str) -> &'static str {
+    let is_part = |material: &Material| matches!(material.owner, Owner::Part(_));
+    if name == PART_NAMES[0] && setup.picture.scene.materials.iter().any(is_part) {
+        "material.part"
+    } else {
+        "style.where"
+    }
 }
 
 /// What a style draws of its particles.

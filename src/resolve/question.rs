@@ -28,6 +28,8 @@ impl Inquiry {
         let own = |drawn: &DrawnStyle| !drawn.shares_colors;
         (!division.is_one()).then(|| StyleQuestions {
             division: division.clone(),
+            shared: color::question(&self.styled.usual.material.color),
+            first_shares: self.styled.first_shares,
             colors: (self.styled.styles.iter())
                 .map(|drawn| own(drawn).then(|| color::question(&drawn.style.color)))
                 .collect(),
@@ -44,7 +46,17 @@ impl Inquiry {
         Question {
             color: color::question(&manifest.material.color),
             styles,
+            // A clear style may have a radius where the others have none
             radius: match &manifest.input.radius {
+                RadiusSetting::Length(_)
+                    if self.styled.usual.input.radius == RadiusSetting::Auto =>
+                {
+                    if has_body {
+                        RadiusQuestion::AutoOfBody
+                    } else {
+                        RadiusQuestion::Auto
+                    }
+                }
                 RadiusSetting::Auto if has_body => RadiusQuestion::AutoOfBody,
                 RadiusSetting::Auto => RadiusQuestion::Auto,
                 RadiusSetting::Length(_) => RadiusQuestion::Given,

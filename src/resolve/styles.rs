@@ -30,6 +30,10 @@ const STICK_OF_BALLS: f64 = 0.5;
 /// What the looks of styles depend on.
 pub(super) struct Looks<'a> {
     pub(super) manifest: &'a Manifest,
+    /// The style of the first group.
+    pub(super) first: &'a ParticleStyle,
+    /// Whether it is seen in the colours of the material.
+    pub(super) first_shares: bool,
     pub(super) survey: &'a Survey,
     pub(super) camera: &'a Camera,
     pub(super) meshes: &'a GrainMeshes,
@@ -68,10 +72,13 @@ impl Looks<'_> {
             let range = self.survey.styles.get(index).and_then(Option::as_ref);
             let color = color::rule(&style.color, range, self.survey, Some(self.camera))?;
             let (radius, radius_factor) = self.radius(style)?;
-            let bonds = if style.has_sticks() {
-                self.bonds(scene, style, &color, (&radius, radius_factor))?
-            } else {
-                None
+            let bonds = match drawn.source {
+                // They are bound to each other, and to those without a style
+                StyleSource::Part(_) => self.first.bonds.clone(),
+                _ if style.has_sticks() => {
+                    self.bonds(scene, style, &color, (&radius, radius_factor))?
+                }
+                _ => None,
             };
             let place = (self.survey, &color, self.reach);
             let own = arrows::arrows(scene, style.arrows.as_slice(), place)?;
@@ -86,7 +93,7 @@ impl Looks<'_> {
                 name: drawn.title(),
                 is_named: style.name.is_some() && !style.is_clear(),
                 is_of_rest: style.condition.is_none() && style.name.is_none(),
-                shares_colors: drawn.shares_colors,
+                shares_colors: drawn.shares_colors && self.first_shares,
                 form: self.form(style),
                 radius,
                 radius_factor,

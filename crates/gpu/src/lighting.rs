@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 /// Maximum number of groups of spheres that reflect light in different ways.
-pub const MAX_FINISHES: usize = 64;
+pub const MAX_FINISHES: usize = 65;
 
 /// How light is transported.
 #[derive(Debug, Clone, Copy)]

@@ -17,12 +17,16 @@ use super::style::{Style, StyleDraw, StyleMaterial, StyleMaterialKind};
 pub struct StyledManifest {
     /// The settings, with `[material]`, `[surface]`, `input.radius` and `[bonds]` of the first group.
     pub manifest: Manifest,
+    /// The settings as they are, from which styles take what they do not say.
+    pub usual: Manifest,
     /// The styles of the other groups, in the order of these.
     pub styles: Vec<DrawnStyle>,
     /// Which particles belong to which group. The claims are in the order of the manifest's styles, without hidden ones.
     pub division: Division,
     /// Whether a style of the manifest has become the first group.
     pub has_first: bool,
+    /// Whether the first group is seen in the colours of `[material]`.
+    pub first_shares: bool,
 }
 
 /// The style of a group of particles.
@@ -32,7 +36,7 @@ pub struct DrawnStyle {
     pub source: StyleSource,
     /// How the particles are drawn, with all settings of colours in [`Style::color`].
     pub style: Style,
-    /// Whether they have one scale of colours with the first group.
+    /// Whether they have the colours of `[material]`, with one scale for all such groups.
     pub shares_colors: bool,
 }
 
@@ -75,13 +79,8 @@ impl Manifest {
         let mut drawn = self.drawn_styles();
         let is_first = |drawn: &&DrawnStyle| drawn.style.is_clear() && !self.material.is_clear();
         let first = drawn.iter().find(is_first).cloned();
-        if let Some(first) = &first {
-            if drawn.iter().all(|drawn| drawn.style.condition.is_some()) {
-                drawn.push(self.drawn(StyleSource::Rest, self.style_of_rest()));
-            }
-            for other in &mut drawn {
-                other.shares_colors &= first.shares_colors;
-            }
+        if first.is_some() && drawn.iter().all(|drawn| drawn.style.condition.is_some()) {
+            drawn.push(self.drawn(StyleSource::Rest, self.style_of_rest()));
         }
         let first_source = first.as_ref().map(|first| first.source);
         // Bring the others into the order of what they draw
@@ -100,7 +99,15 @@ impl Manifest {
         if let Some(first) = &first {
             manifest.take_style(&first.style);
         }
-        StyledManifest { manifest, styles, division, has_first: first.is_some() }
+        let has_usual_colors = first.as_ref().is_none_or(|first| first.shares_colors);
+        StyledManifest {
+            first_shares: has_usual_colors && manifest.material.shows_colors(),
+            manifest,
+            usual: self.clone(),
+            styles,
+            division,
+            has_first: first.is_some(),
+        }
     }
 
     /// The styles that are not hidden, and those of parts.

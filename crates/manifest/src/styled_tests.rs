@@ -86,5 +86,7 @@ fn styles_have_the_colors_of_the_material_beside_a_clear_one() {
     assert_eq!(found.manifest.material.color, ColorSetting::Rgb(Vec3::Z));
     let colors: Vec<&ColorSetting> = found.styles.iter().map(|drawn| &drawn.style.color).collect();
     assert_eq!(colors, [&ColorSetting::Rgb(Vec3::X); 2]);
-    assert!(found.styles.iter().all(|drawn| !drawn.shares_colors));
+    // They share a scale without the clear one
+    assert!(found.styles.iter().all(|drawn| drawn.shares_colors) && !found.first_shares);
+    assert_eq!(found.usual.material.color, ColorSetting::Rgb(Vec3::X));
 }

@@ -254,8 +254,12 @@ impl Question<'_> {
 pub struct StyleQuestions<'a> {
     /// Which particles have which style, by its index and 1.
     pub division: Division,
-    /// The colours of each style; None: those of the particles without one, whose range is that of both.
+    /// The colours of each style; None: [`Self::shared`].
     pub colors: Vec<Option<ColorQuestion<'a>>>,
+    /// Colours of several styles, whose range is that of all their particles.
+    pub shared: ColorQuestion<'a>,
+    /// Whether the particles without a style have these colours, too.
+    pub first_shares: bool,
 }
 
 /// What a job needs to know about radii.

@@ -40,6 +40,8 @@ pub(super) struct Totals {
     has_radii: bool,
     reach: f32,
     color: ColorTotals,
+    /// Of styles that share colours.
+    shared: ColorTotals,
     /// The colours of styles.
     styles: Vec<ColorTotals>,
     labels: Labels,
@@ -89,6 +91,7 @@ impl Totals {
             has_radii: false,
             reach: 0.0,
             color: ColorTotals::default(),
+            shared: ColorTotals::default(),
             styles: Vec::new(),
             labels: Labels::new(),
             points: Vec::new(),
@@ -120,7 +123,7 @@ impl Totals {
         self.find_velocity_and_colors(&raw, question.color);
         let origin =
             self.bounds.map_or(DVec3::ZERO, |bounds| choose_origin(bounds.outer.0, bounds.outer.1));
-        let groups = question.styles.map(|styles| groups_of(styles, &raw, up));
+        let groups = question.styles.and_then(|styles| groups_of(styles, &raw, up));
         // Count particles, and remember the heaviest frame
         let sampled = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
@@ -141,14 +144,17 @@ impl Totals {
             None => self.color.add(velocity, question.color, context),
             Some((groups, styles)) => {
                 self.styles.resize_with(styles.colors.len(), ColorTotals::default);
-                let usual = Some(question.color);
-                let questions = std::iter::once(&usual).chain(&styles.colors);
-                let totals = std::iter::once(&mut self.color).chain(&mut self.styles);
-                for ((question, total), raw) in questions.zip(totals).zip(groups) {
+                let add = |total: &mut ColorTotals, question, raw| {
                     let frame = &ParticleFrame::from_raw(raw, origin);
                     total.was_empty |= frame.is_empty();
+                    total.add(velocity, question, FrameContext { frame, ..context });
+                };
+                add(&mut self.color, question.color, groups.first);
+                add(&mut self.shared, styles.shared, groups.shared);
+                let questions = styles.colors.iter().zip(groups.others);
+                for (total, (question, raw)) in self.styles.iter_mut().zip(questions) {
                     if let Some(question) = question {
-                        total.add(velocity, *question, FrameContext { frame, ..context });
+                        add(total, *question, raw);
                     }
                 }
             }
@@ -300,10 +306,11 @@ impl Totals {
         let rgb = rgb_colors(self.rgb, color.as_ref());
         let questions = question.styles.map(|styles| &styles.colors[..]).unwrap_or_default();
         let styles = self.styles.into_iter().zip(questions);
+        let shared = question.styles.and_then(|styles| self.shared.finish(styles.shared));
         let finished = |(total, question): (ColorTotals, &Option<ColorQuestion<'_>>)| match question
         {
             Some(question) => total.finish(*question),
-            None => color.clone(),
+            None => shared.clone(),
         };
         let styles = styles.map(finished).collect();
         // Use the origin of native frames: with a different one, they could not be traced in place.
@@ -353,31 +360,39 @@ impl Totals {
     }
 }
 
-/// The particles of `raw` in groups: those without a style, with those of styles that share their colours, and those of
-/// each. Of names without a value, which are reported later, there are no groups.
-fn groups_of(styles: &StyleQuestions<'_>, raw: &RawParticles, up: DVec3) -> Vec<RawParticles> {
+/// The particles of a frame, as they are drawn.
+struct Groups {
+    /// Those without a style, and with them those of styles that have their colours.
+    first: RawParticles,
+    /// Those of each style.
+    others: Vec<RawParticles>,
+    /// Those that share colours.
+    shared: RawParticles,
+}
+
+/// The particles of `raw` in groups; None if names have no value, which is reported later.
+fn groups_of(styles: &StyleQuestions<'_>, raw: &RawParticles, up: DVec3) -> Option<Groups> {
     let division = Division { up: Some(up), ..styles.division.clone() };
     let all: Vec<u32> = (0..index_u32(raw.positions.len())).collect();
-    let Ok(divided) = division.divide(raw, &all) else {
-        return Vec::new();
-    };
+    let divided = division.divide(raw, &all).ok()?;
     let of = |indices: &[u32]| {
         let mut group = raw.clone();
         group.select(indices);
         group
     };
-    let mut first = divided.order[..divided.ends[0]].to_vec();
-    let mut groups = vec![RawParticles::default()];
+    let first = &divided.order[..divided.ends[0]];
+    let mut shared = if styles.first_shares { first.to_vec() } else { Vec::new() };
+    let mut others = Vec::new();
     for (ends, color) in divided.ends.windows(2).zip(&styles.colors) {
         let own = &divided.order[ends[0]..ends[1]];
-        groups.push(of(own));
+        others.push(of(own));
         if color.is_none() {
-            first.extend(own);
+            shared.extend(own);
         }
     }
-    first.sort_unstable();
-    groups[0] = of(&first);
-    groups
+    shared.sort_unstable();
+    let first = of(if styles.first_shares { &shared } else { first });
+    Some(Groups { first, others, shared: of(&shared) })
 }
 
 /// The colours of the attribute `rgb`, unless the range of another attribute was found: speed has precedence.

@@ -107,7 +107,8 @@ impl MemoryModel<'_> {
             particles: kept,
             // The kept data are in the memory that the allocator retains.
             reading: shared(frame).max(self.retained(frame).saturating_sub(kept)),
-            images: self.film() * place.before.min(place.neighbours.encoders + 1),
+            images: self.film() * place.before.min(place.neighbours.encoders + 1)
+                + self.denoised_beside(encoded),
             encoding: encoded * self.encoding(),
             ..place.idle
         };
@@ -136,7 +137,9 @@ impl MemoryModel<'_> {
                 _ => place.tree,
             },
             surface: self.surface(frame).kept + self.meshes_beside(frame),
-            images: self.film() * (1 + encoded) + self.tracing_scratch() * threads,
+            images: self.film() * (1 + encoded)
+                + self.tracing_scratch() * threads
+                + self.denoised_beside(encoded),
             encoding: encoded * self.encoding() + self.names(frame),
         }
     }
@@ -171,24 +174,34 @@ impl MemoryModel<'_> {
         ground_light_bytes(&self.setup.picture.scene, &self.setup.picture.render)
     }
 
-    /// After `tracing`: the frames before and after are usually done, except with several encoders, which are there
-    /// because encoding takes longer.
-    fn denoising(&self, place: &Place<'_>, tracing: MemoryNeed) -> MemoryNeed {
+    /// Memory of so many images that are denoised while others are traced.
+    fn denoised_beside(&self, images: u64) -> u64 {
+        if self.setup.denoises_when_encoding() { images * self.filtering() } else { 0 }
+    }
+
+    /// Memory for denoising an image.
+    fn filtering(&self) -> u64 {
         let picture = &self.setup.picture;
-        let render = &picture.render;
         let threads = rayon::current_num_threads() as u64;
-        let Some(settings) = picture.denoise else {
+        let [width, height] = [picture.render.width, picture.render.height];
+        picture
+            .denoise
+            .map_or(0, |settings| denoise::predicted_bytes(width, height, &settings, threads))
+    }
+
+    /// After `tracing`: the frames before and after are usually done, except with several encoders, which are there
+    /// because encoding takes longer. Images that are denoised while others are traced need the most then, or alone.
+    fn denoising(&self, place: &Place<'_>, tracing: MemoryNeed) -> MemoryNeed {
+        if self.setup.picture.denoise.is_none() {
             return MemoryNeed::default();
-        };
+        }
         // Count the images that exist at this time
         let Neighbours { encoders, are_slow } = place.neighbours;
         let encoded = place.before.min(encoders);
-        let at_once = if self.setup.denoises_when_encoding() { encoded.max(1) } else { 1 };
-        let filtering = denoise::predicted_bytes(render.width, render.height, &settings, threads);
         MemoryNeed {
             program: place.idle.program,
             reading: if are_slow { tracing.reading } else { self.next_kept(place) },
-            images: self.film() * (1 + encoded) + at_once * filtering,
+            images: self.film() * (1 + encoded) + self.filtering(),
             encoding: if are_slow || encoders > 1 {
                 tracing.encoding
             } else {

@@ -19,7 +19,7 @@ struct SceneUniform {
   image: u32, is_environment_visible: u32, zero: u32, zero_too: u32,
   finish_count: u32, is_ambient: u32, zero_again: u32, zero_at_last: u32,
   // How spheres reflect light, by the first index of each group
-  finishes: array<Finish, 64>,
+  finishes: array<Finish, 65>,
   // Irradiance of the environment
   harmonics: array<vec4<f32>, 9>,
 }

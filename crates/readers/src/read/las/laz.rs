@@ -26,6 +26,9 @@ use spherule_frame::{MemoryBudget, ParseError};
 const MAX_POINTS_EACH: usize = 1024;
 /// Most extra bytes of a point: the decoder holds some kilobytes for each. Files have a few dozen.
 const MAX_EXTRA: u16 = 1024;
+/// Least number of points of a chunk that is not the only one: each takes half a millisecond to begin. LASzip writes
+/// 50,000.
+const LEAST_CHUNK: usize = 64;
 /// Bytes of the place of the table of chunks, and of a table without chunks.
 const TABLE: usize = 8;
 /// Where the record has the number of points of a chunk.
@@ -128,6 +131,9 @@ impl Settings {
             let what = "LAZ with chunks of several lengths in a format of points up to 5, which is not read; write it \
                         anew with `laszip -i in.laz -o out.laz`";
             return Err(ParseError::unsupported(what));
+        }
+        if kind == CHUNKS && (vlr.chunk_size() as usize) < LEAST_CHUNK.min(header.count) {
+            return Err(bad(format!("chunks of {} points", vlr.chunk_size())));
         }
         let vlr = LazVlr::from_buffer(&fixed).map_err(|error| bad(error.to_string()))?;
         Ok(Self { vlr, is_one_chunk: kind == ONE_CHUNK, layers })
@@ -335,6 +341,7 @@ mod tests {
             (2, stream, &[9, 0][..], "Compressor type 9 is not valid"),
             (2, stream, &[3, 0], "the unknown compressor 3"),
             (2, stream + 12, &[255; 4], "chunks of several lengths"),
+            (2, stream + 12, &[1, 0, 0, 0], "chunks of 1 points"),
             (2, stream + 32, &[200, 0], "the record of LASzip: "),
             (2, stream + 34, &[10, 0], "are not those of the format of points 2"),
             (2, stream + 36, &[19, 0], "are not those of the format of points 2"),
