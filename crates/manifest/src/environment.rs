@@ -73,7 +73,7 @@ impl Default for Environment {
         Self {
             kind: EnvironmentKind::Studio,
             sun: Sun::DEFAULT,
-            turbidity: 2.5,
+            turbidity: 1.5,
             albedo: 0.2,
             image: None,
             extract_sun: ExtractSun::Auto,
@@ -104,7 +104,7 @@ impl Environment {
             /// of the first view of the camera, and 90 on the viewer's side. A size of 0.53 is that of the sun as seen
             /// from the earth; a larger one has softer shadows.
             sun => self.sun, affects(Affects::PathTracing);
-            /// sky: haze in the air, 1 (none) to 10; 2.5 is a clear day
+            /// sky: haze in the air, 1 (none) to 10; 1.5 is a very clear day, 2.5 a usual one
             turbidity => self.turbidity, from(1), to(10), affects(Affects::Sky);
             /// sky: reflectance of the ground around, which lights the sky
             albedo => self.albedo, from(0), to(1), affects(Affects::Sky);
