@@ -13,7 +13,7 @@ use crate::pipeline::{
 };
 use crate::render::{Film, FilmPlane};
 use crate::resolve::{Inquiry, SceneInputs, setup};
-use crate::scene::Finish;
+use crate::scene::{Finish, Owner};
 use crate::survey::Survey;
 
 /// Particles of five types in a row of slabs.
@@ -134,6 +134,11 @@ fn bodies_of_styles_have_ids_of_their_particles() {
     );
     let (setup, film, _) = rendered(&styles);
     assert_eq!(setup.picture.particles.styles_in_tree(&setup), 2);
+    // Their objects are named by their places in the manifest, although spheres are drawn first
+    let styles = setup.picture.particles.others().iter();
+    let owners: Vec<Owner> =
+        styles.map(|style| setup.picture.scene.material(style.material).owner).collect();
+    assert_eq!(owners, [2, 0, 1].map(Owner::Style));
     let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
     let pixels = check_points(&film, [[0.0, 1.2], near(0.7), near(0.35), near(0.4), near(0.4)]);
     assert!(pixels.iter().all(|pixels| *pixels > 100), "{pixels:?}");

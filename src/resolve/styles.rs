@@ -14,7 +14,7 @@ use crate::pipeline::{
     ArrowStyle, BondStyle, ColorRule, GrainMeshes, GrainRules, ParticleStyle, RadiusRule,
     StyleForm, TrailStyle,
 };
-use crate::scene::{Bounds, Camera, Fresnel, Material, Scene};
+use crate::scene::{Bounds, Camera, Fresnel, Material, Owner, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::{ELEMENT, Survey};
 
@@ -61,12 +61,8 @@ impl Looks<'_> {
         for (index, drawn) in styles.iter().enumerate() {
             let style = &drawn.style;
             // The manifest has no more of them than there are materials
-            let material = self.material(style);
-            let added = match drawn.source {
-                StyleSource::Part(_) => scene.add_part(material),
-                StyleSource::Style(_) | StyleSource::Rest => scene.add_style(material),
-            };
-            let Some(material) = added else {
+            let Some(material) = scene.add_owned(self.material(style), self.owner(drawn.source))
+            else {
                 break;
             };
             let range = self.survey.styles.get(index).and_then(Option::as_ref);
@@ -104,6 +100,16 @@ impl Looks<'_> {
             });
         }
         Ok(looks)
+    }
+
+    /// What has the material of a style: names in Cryptomatte count them in the order of the manifest.
+    fn owner(&self, source: StyleSource) -> Owner {
+        let number = |place: usize| u16::try_from(place).unwrap_or(u16::MAX);
+        match source {
+            StyleSource::Style(place) => Owner::Style(number(place)),
+            StyleSource::Part(place) => Owner::Part(number(place)),
+            StyleSource::Rest => Owner::Style(number(self.manifest.styles.len())),
+        }
     }
 
     /// The material of a style: its own, or else that of the other particles if it is opaque.

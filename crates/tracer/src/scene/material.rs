@@ -14,9 +14,9 @@ use super::ground;
 pub enum Owner {
     /// The particles without a style.
     Particles,
-    /// Particles that are drawn in a style of their own; the number counts such styles.
+    /// Particles that are drawn in a style of their own, with its number.
     Style(u16),
-    /// The same, if nothing but their material differs: parts of the particles.
+    /// The same, if nothing but their material differs: parts of the particles, with the number of their material.
     Part(u16),
     /// Foam and spray.
     Spray,

@@ -99,7 +99,7 @@ pub struct Scene {
     /// Ambient light (`ambient` of eq. 4.1).
     pub ambient_light: Vec3,
     /// The materials by [`MaterialId`]: of the particles, of spray and of the ground, and then those of
-    /// [`Self::add`], [`Self::add_style`] and [`Self::add_part`].
+    /// [`Self::add`], [`Self::add_style`] and [`Self::add_owned`].
     pub materials: Vec<Material>,
     /// Background for rays without an intersection.
     pub background: Background,
@@ -172,24 +172,24 @@ impl Scene {
         self.push(material, Owner::Thing)
     }
 
-    /// Adds the material of particles with a style of their own; None as in [`Self::add`].
+    /// Adds the material of particles with a style of their own, behind those of other styles; None as in [`Self::add`].
     pub fn add_style(&mut self, material: Material) -> Option<MaterialId> {
         self.push(material, Owner::Style)
     }
 
-    /// The same, with a name of its own in Cryptomatte: of parts of the particles.
-    pub fn add_part(&mut self, material: Material) -> Option<MaterialId> {
-        self.push(material, Owner::Part)
+    /// Adds a material with this owner; None as in [`Self::add`].
+    pub fn add_owned(&mut self, material: Material, owner: Owner) -> Option<MaterialId> {
+        let id = MaterialId::at(self.materials.len())?;
+        self.materials.push(Material { owner, ..material });
+        Some(id)
     }
 
-    /// Appends a material of an owner that counts those of its kind.
+    /// Adds a material of an owner that counts those of its kind.
     fn push(&mut self, material: Material, owner: fn(u16) -> Owner) -> Option<MaterialId> {
-        let id = MaterialId::at(self.materials.len())?;
         let kind = std::mem::discriminant(&owner(0));
         let is_of_kind = |m: &&Material| std::mem::discriminant(&m.owner) == kind;
         let number = u16::try_from(self.materials.iter().filter(is_of_kind).count()).ok()?;
-        self.materials.push(Material { owner: owner(number), ..material });
-        Some(id)
+        self.add_owned(material, owner(number))
     }
 
     /// The material with an `id`.
@@ -231,13 +231,13 @@ mod tests {
     fn materials_are_numbered_by_their_owners() {
         let view = CameraView { eye: DVec3::X, look_at: DVec3::ZERO, up: DVec3::Z, fov: 30.0 };
         let mut scene = Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap());
-        let part = scene.add_part(Material::DEFAULT).unwrap();
+        let part = scene.add_owned(Material::DEFAULT, Owner::Part(0)).unwrap();
         let ids = [0.1, 0.2].map(|grey| scene.add(Material::matte(Vec3::splat(grey))).unwrap());
-        let last = scene.add_part(Material::DEFAULT).unwrap();
+        let last = scene.add_style(Material::DEFAULT).unwrap();
         assert_eq!([part, ids[0], ids[1], last].map(MaterialId::index), [3, 4, 5, 6]);
         let owners = scene.materials.iter().map(|material| material.owner).collect::<Vec<_>>();
         let [particles, spray, ground] = [Owner::Particles, Owner::Spray, Owner::Ground];
-        let added = [Owner::Part(0), Owner::Thing(0), Owner::Thing(1), Owner::Part(1)];
+        let added = [Owner::Part(0), Owner::Thing(0), Owner::Thing(1), Owner::Style(0)];
         assert_eq!(owners[..3], [particles, spray, ground]);
         assert_eq!(owners[3..], added);
         // No material is lost or replaced at the end of the numbers
