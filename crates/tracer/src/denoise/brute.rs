@@ -7,7 +7,7 @@ use glam::{DVec3, DVec4, Vec3};
 use super::gather::{
     DEPTHS, MAX_VALUE, MIN_ALBEDO, MIN_NOISE, NOISE_WEIGHTS, RELATIVE_NOISE, UNUSABLE_NOISE,
 };
-use super::glints::{ALIKE, BRIGHTER, RADIUS};
+use super::glints::{LIMITS, RADIUS};
 use super::kernels::MAX_DISTANCE;
 use super::settings::{
     ALBEDO_TOLERANCE, DEPTH_TOLERANCE, NORMAL_TOLERANCE, OWN_PART, SLOPE_TOLERANCE,
@@ -124,11 +124,13 @@ impl Picture<'_> {
         let mut others: Vec<f64> =
             around.filter(|q| *q != p && self.is_inside(*q)).map(brightness).collect();
         others.sort_by(|a, b| b.total_cmp(a));
-        let Some(last) = others.len().min(ALIKE).checked_sub(1) else {
+        if others.is_empty() {
             return f64::INFINITY;
-        };
-        let limit = f64::from(BRIGHTER) * others[last];
-        if brightness(p) > limit { limit } else { f64::INFINITY }
+        }
+        let limits =
+            LIMITS.map(|(alike, factor)| f64::from(factor) * others[alike.min(others.len()) - 1]);
+        let lower = limits.into_iter().filter(|limit| brightness(p) > *limit);
+        lower.fold(f64::INFINITY, f64::min)
     }
 
     /// The colours of both halves without albedo.

@@ -6,12 +6,15 @@ use rayon::prelude::*;
 use super::DenoiseInput;
 use super::gather::{Shares, compared, divisor, is_usable};
 
-/// A pixel gives the others at most this many times the light of its neighbours.
-pub(super) const BRIGHTER: f32 = 4.0;
+/// Limits of a pixel: with fewer than this number of neighbours of its kind, it gives the others at most so many times
+/// the light of the last of them. Few pixels are a glint if they are somewhat brighter, several only if they are far
+/// brighter; in the corner of a bright surface, a pixel has eight neighbours of its kind.
+pub(super) const LIMITS: [(usize, f32); 2] = [(4, 4.0), (8, 8.0)];
+/// The most neighbours, and the least factor, of these limits.
+const MOST: usize = LIMITS[1].0;
+const LEAST: f32 = LIMITS[0].1;
 /// Neighbours on each side that a pixel is compared with.
 pub(super) const RADIUS: usize = 2;
-/// Number of neighbours that are about as bright as a pixel that is no glint; a glint may have fewer.
-pub(super) const ALIKE: usize = 4;
 
 /// The limit of the components of each pixel in both halves, without albedo; infinite unless a pixel is a glint.
 pub(super) fn limits(input: &DenoiseInput<'_>) -> Vec<f32> {
@@ -30,10 +33,9 @@ pub(super) fn limits(input: &DenoiseInput<'_>) -> Vec<f32> {
                 at.saturating_sub(RADIUS).max(first)..(at + RADIUS + 1).min(end)
             });
             let [columns, rows] = around;
-            // At the edges of tiny views, there are fewer neighbours
-            let needed = ALIKE.min(columns.len() * rows.len() - 1);
+            let neighbours = columns.len() * rows.len() - 1;
             let all = rows.flat_map(|y| &brightness[y * width..][columns.clone()]);
-            *limit = limit_of(brightness[y * width + x], needed, all);
+            *limit = limit_of(brightness[y * width + x], neighbours, all);
         }
     });
     limits
@@ -54,15 +56,14 @@ fn brightness_of(input: &DenoiseInput<'_>, shares: Shares, i: usize) -> f32 {
     component(0).max(component(1)).max(component(2))
 }
 
-/// The limit of a pixel of this `brightness`, which is one of `all` around it, unless it has as many neighbours of its
-/// kind as are `needed`, at most [`ALIKE`].
-fn limit_of<'a>(brightness: f32, needed: usize, all: impl Iterator<Item = &'a f32>) -> f32 {
+/// The limit of a pixel of this `brightness`, which is one of `all` in its window, with so many `neighbours`.
+fn limit_of<'a>(brightness: f32, neighbours: usize, all: impl Iterator<Item = &'a f32>) -> f32 {
     // The largest ones, falling, with the pixel itself
-    let mut largest = [0.0_f32; ALIKE + 1];
+    let mut largest = [0.0_f32; MOST + 1];
     let mut alike = 0;
     for other in all {
-        alike += usize::from(other * BRIGHTER >= brightness);
-        if alike > needed {
+        alike += usize::from(other * LEAST >= brightness);
+        if alike > MOST {
             return f32::INFINITY;
         }
         let mut rest = *other;
@@ -72,5 +73,8 @@ fn limit_of<'a>(brightness: f32, needed: usize, all: impl Iterator<Item = &'a f3
             }
         }
     }
-    BRIGHTER * largest[needed]
+    // At the edges of tiny views, there are fewer neighbours
+    let limits = LIMITS.map(|(needed, factor)| factor * largest[needed.min(neighbours)]);
+    let lower = limits.into_iter().filter(|limit| brightness > *limit);
+    lower.fold(f32::INFINITY, f32::min)
 }

@@ -20,8 +20,9 @@
 //! half itself. Otherwise a bright sample that the other half does not have is spread over the window: the error of
 //! water with 16 samples rose from 3.4 to 4.8 of 255, and is 3.3 this way.
 //!
-//! A pixel that is more than 4 times as bright as all but 3 of its 24 neighbours is limited to that when it is filtered;
-//! the rest of its light stays where it is. Otherwise glints of a sun become squares as large as the window.
+//! A pixel that is more than 4 times as bright as all but 3 of its 24 neighbours, or 8 times as bright as all but 7, is
+//! limited to that when it is filtered; the rest of its light stays where it is. Otherwise glints of a sun become squares
+//! as large as the window.
 //!
 //! On a transparent background, pixels are compared as they are over white, and their coverage is averaged with the weights
 //! of the colour: a shadow there is coverage without colour. Coverage by surfaces stays as it is.

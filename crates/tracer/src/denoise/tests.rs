@@ -425,8 +425,14 @@ fn a_bright_sample_does_not_spread() {
 #[test]
 fn glints_do_not_become_squares() {
     for (light, glint) in [1e3, 1e4, 1e5].into_iter().flat_map(|light| {
-        let shapes =
-            [&[(20, 20)][..], &[(20, 20), (21, 20)], &[(20, 20), (21, 21), (20, 21)], &[(0, 39)]];
+        let shapes = [
+            &[(20, 20)][..],
+            &[(20, 20), (21, 20)],
+            &[(20, 20), (21, 21), (20, 21)],
+            &[(0, 39)],
+            // The reflection of a sun in a wave
+            &[(22, 20), (23, 20), (21, 21), (22, 21), (20, 22), (21, 22)],
+        ];
         shapes.map(|shape| (light, shape))
     }) {
         for part_of_odd in [0.0, 0.4, 1.0] {
