@@ -10,11 +10,11 @@ use crate::manifest::{Manifest, Side, StyledManifest};
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
-    FileSettings, FrameSize, GrainMeshes, MemoryModel, ParticleRules, ParticleStyle, Picture,
-    PictureMesh, RadiusRule, Setup, StyleForm, Things, gpu,
+    FileSettings, FrameSize, GrainMeshes, MemoryModel, ParticleRules, Picture, PictureMesh,
+    RadiusRule, Setup, Things, gpu,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, MaterialId, Texture};
+use crate::scene::{Bounds, Texture};
 use crate::selection::Division;
 use crate::survey::Survey;
 
@@ -82,6 +82,9 @@ pub fn setup(
     inputs: SceneInputs<'_>,
 ) -> Result<Setup, ResolveError> {
     manifest.check_rules()?;
+    // The environment is made once, also if the picture gets smaller
+    let own = OnceLock::new();
+    let inputs = SceneInputs { kept: inputs.kept.or(Some(&own)), ..inputs };
     let survey = camera::with_framed_meshes(survey, manifest, &inputs.meshes);
     let styled = manifest.styled();
     let manifest = &styled.manifest;
@@ -150,19 +153,8 @@ fn setup_on(
     let place = (survey, &color, extent.reach);
     let mut arrows = arrows::arrows(&mut scene, &manifest.arrows, place)?;
     let mut trails = arrows::trails(&mut scene, &manifest.trails, place)?;
-    let first = ParticleStyle {
-        name: "particles".to_owned(),
-        is_named: false,
-        is_of_rest: true,
-        shares_colors: true,
-        form: StyleForm::of(manifest.surface),
-        opacity: opacity::opacity(&manifest.material.opacity, survey)?,
-        material: MaterialId::PARTICLES,
-        bonds: bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?,
-        radius_factor: 1.0,
-        radius,
-        color,
-    };
+    let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
+    let first = styles::first(manifest, survey, (radius, color, bonds))?;
     let looks = styles::Looks {
         manifest: &styled.usual,
         first: &first,

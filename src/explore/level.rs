@@ -230,7 +230,7 @@ mod tests {
         let [fixed, each] = speed.parts();
         assert!((0.03..0.07).contains(&fixed) && each < 3e-8, "{fixed} {each}");
         assert!(quick(whole(JOB.0), speed).size[0] > 800);
-        // Particles that take ten times as long, of which no large picture was rendered
+        // Particles that take ten times as long; no large picture of them has been rendered yet
         let time = |level: &Level| 1e-6 * level.work();
         for _ in 0..20 {
             let level = quick(whole(JOB.0), speed);

@@ -313,7 +313,7 @@ impl LoadedFrame<'_> {
             return;
         };
         let styles = setup.picture.particles.styles.iter().enumerate();
-        let absent = styles.skip(1).filter(|(index, style)| {
+        let absent = styles.filter(|(index, style)| {
             !style.is_of_rest && frame.shading.ranges.of(*index).is_empty()
         });
         let is_empty = frame.centers.is_empty();

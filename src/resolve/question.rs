@@ -42,21 +42,16 @@ impl Inquiry {
         let has_body = manifest.surface.kind != SurfaceKind::Spheres
             || self.styled.styles.iter().any(|drawn| drawn.style.is_body());
         let needs_points = |setting: &ColorSetting| color::is_depth(setting);
+        // A clear style may have a radius where the others have none
+        let radius = match (&manifest.input.radius, &self.styled.usual.input.radius) {
+            (RadiusSetting::Length(_), RadiusSetting::Auto) => &RadiusSetting::Auto,
+            (own, _) => own,
+        };
         // Ask only for what the manifest leaves open: each answer takes time
         Question {
             color: color::question(&manifest.material.color),
             styles,
-            // A clear style may have a radius where the others have none
-            radius: match &manifest.input.radius {
-                RadiusSetting::Length(_)
-                    if self.styled.usual.input.radius == RadiusSetting::Auto =>
-                {
-                    if has_body {
-                        RadiusQuestion::AutoOfBody
-                    } else {
-                        RadiusQuestion::Auto
-                    }
-                }
+            radius: match radius {
                 RadiusSetting::Auto if has_body => RadiusQuestion::AutoOfBody,
                 RadiusSetting::Auto => RadiusQuestion::Auto,
                 RadiusSetting::Length(_) => RadiusQuestion::Given,

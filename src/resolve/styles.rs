@@ -14,7 +14,7 @@ use crate::pipeline::{
     ArrowStyle, BondStyle, ColorRule, GrainMeshes, GrainRules, ParticleStyle, RadiusRule,
     StyleForm, TrailStyle,
 };
-use crate::scene::{Bounds, Camera, Fresnel, Material, Owner, Scene};
+use crate::scene::{Bounds, Camera, Fresnel, Material, MaterialId, Owner, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::{ELEMENT, Survey};
 
@@ -26,6 +26,30 @@ const STICK: f64 = 0.125;
 
 /// Radius of the sticks between balls, in radii of the largest balls.
 const STICK_OF_BALLS: f64 = 0.5;
+
+/// The style of the first group, with its radii, colours and bonds.
+///
+/// # Errors
+/// The particles do not have the value that opacities follow from.
+pub(super) fn first(
+    manifest: &Manifest,
+    survey: &Survey,
+    (radius, color, bonds): (RadiusRule, ColorRule, Option<BondStyle>),
+) -> Result<ParticleStyle, ResolveError> {
+    Ok(ParticleStyle {
+        name: "particles".to_owned(),
+        is_named: false,
+        is_of_rest: true,
+        shares_colors: true,
+        form: StyleForm::of(manifest.surface),
+        opacity: opacity::opacity(&manifest.material.opacity, survey)?,
+        material: MaterialId::PARTICLES,
+        radius_factor: 1.0,
+        radius,
+        color,
+        bonds,
+    })
+}
 
 /// What the looks of styles depend on.
 pub(super) struct Looks<'a> {

@@ -150,7 +150,9 @@ impl Totals {
                     total.add(velocity, question, FrameContext { frame, ..context });
                 };
                 add(&mut self.color, question.color, groups.first);
-                add(&mut self.shared, styles.shared, groups.shared);
+                if let Some(shared) = groups.shared {
+                    add(&mut self.shared, styles.shared, shared);
+                }
                 let questions = styles.colors.iter().zip(groups.others);
                 for (total, (question, raw)) in self.styles.iter_mut().zip(questions) {
                     if let Some(question) = question {
@@ -306,7 +308,10 @@ impl Totals {
         let rgb = rgb_colors(self.rgb, color.as_ref());
         let questions = question.styles.map(|styles| &styles.colors[..]).unwrap_or_default();
         let styles = self.styles.into_iter().zip(questions);
-        let shared = question.styles.and_then(|styles| self.shared.finish(styles.shared));
+        let shared = match question.styles {
+            Some(styles) if !styles.first_shares => self.shared.finish(styles.shared),
+            _ => color.clone(),
+        };
         let finished = |(total, question): (ColorTotals, &Option<ColorQuestion<'_>>)| match question
         {
             Some(question) => total.finish(*question),
@@ -366,8 +371,8 @@ struct Groups {
     first: RawParticles,
     /// Those of each style.
     others: Vec<RawParticles>,
-    /// Those that share colours.
-    shared: RawParticles,
+    /// Those that share colours, if they do so without the first ones.
+    shared: Option<RawParticles>,
 }
 
 /// The particles of `raw` in groups; None if names have no value, which is reported later.
@@ -380,9 +385,8 @@ fn groups_of(styles: &StyleQuestions<'_>, raw: &RawParticles, up: DVec3) -> Opti
         group.select(indices);
         group
     };
-    let first = &divided.order[..divided.ends[0]];
-    let mut shared = if styles.first_shares { first.to_vec() } else { Vec::new() };
-    let mut others = Vec::new();
+    let mut first = divided.order[..divided.ends[0]].to_vec();
+    let (mut shared, mut others) = (Vec::new(), Vec::new());
     for (ends, color) in divided.ends.windows(2).zip(&styles.colors) {
         let own = &divided.order[ends[0]..ends[1]];
         others.push(of(own));
@@ -390,9 +394,13 @@ fn groups_of(styles: &StyleQuestions<'_>, raw: &RawParticles, up: DVec3) -> Opti
             shared.extend(own);
         }
     }
+    if styles.first_shares {
+        first.append(&mut shared);
+        first.sort_unstable();
+    }
     shared.sort_unstable();
-    let first = of(if styles.first_shares { &shared } else { first });
-    Some(Groups { first, others, shared: of(&shared) })
+    let shared = (!styles.first_shares).then(|| of(&shared));
+    Some(Groups { first: of(&first), others, shared })
 }
 
 /// The colours of the attribute `rgb`, unless the range of another attribute was found: speed has precedence.

@@ -37,11 +37,11 @@ fn floor(environment: Environment) -> Scene {
     scene
 }
 
-fn dark() -> Environment {
+pub(super) fn dark() -> Environment {
     Environment::constant(Vec3::ZERO)
 }
 
-fn sun(half_angle: f64, irradiance: Vec3) -> Light {
+pub(super) fn sun(half_angle: f64, irradiance: Vec3) -> Light {
     Light {
         kind: LightKind::Sun { to_light: Vec3::Z, half_angle },
         radiance: irradiance,
@@ -56,13 +56,23 @@ fn with_photons(photons: u32, samples: u32) -> RenderSettings {
 }
 
 /// Means of the red parts of squares of four by four pixels.
-fn blocks(film: &Film) -> Vec<f32> {
+pub(super) fn blocks(film: &Film) -> Vec<f32> {
     let pixel = |x: usize, y: usize| film.color[32 * y + x][0];
     let mean = |block: usize| {
         let [x, y] = [block % 8, block / 8].map(|i| 4 * i);
         (0..16).map(|i| pixel(x + i % 4, y + i / 4)).sum::<f32>() / 16.0
     };
     (0..64).map(mean).collect()
+}
+
+/// A large sun at the zenith, as an environment that paths find, with half its angle in radians.
+pub(super) fn large_sun() -> (Environment, f64) {
+    let mut pixels = vec![Vec3::ZERO; 512 * 256];
+    pixels[..512 * CAP_ROWS].fill(Vec3::splat(100.0));
+    let map = RadianceMap::new(512, 256, pixels).unwrap();
+    let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
+    let half_angle = std::f64::consts::PI * CAP_ROWS as f64 / 256.0;
+    (Environment::from_map(axes, &map, Vec3::ONE), half_angle)
 }
 
 /// The pixels in the middle.
@@ -75,14 +85,9 @@ fn middle(film: &Film) -> Vec<Vec3> {
 
 #[test]
 fn the_caustic_of_a_glass_ball_is_that_of_path_tracing() {
-    // A large sun at the zenith, as an environment that paths find, and as a light
-    let mut pixels = vec![Vec3::ZERO; 512 * 256];
-    pixels[..512 * CAP_ROWS].fill(Vec3::splat(100.0));
-    let map = RadianceMap::new(512, 256, pixels).unwrap();
-    let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
-    let environment = Environment::from_map(axes, &map, Vec3::ONE);
+    // The sun as an environment, and as a light
+    let (environment, half_angle) = large_sun();
     let irradiance = environment.irradiance(Vec3::Z);
-    let half_angle = std::f64::consts::PI * CAP_ROWS as f64 / 256.0;
     let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 1.6), 1.0);
     let expected = image(&ball, &floor(environment), Vec3::ONE, &with_photons(0, 1024));
     let mut scene = floor(dark());

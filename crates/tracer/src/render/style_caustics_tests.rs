@@ -7,16 +7,12 @@ use glam::{DVec3, Vec3};
 
 use super::{
     brute::{Ball, Balls},
+    ground_light_tests::{blocks, dark, large_sun, sun},
     path_tests::{GLASS, settings},
     *,
 };
-use crate::scene::{
-    Background, Camera, CameraView, Environment, EnvironmentAxes, Light, LightKind, RadianceMap,
-};
+use crate::scene::{Background, Camera, CameraView, Environment, Light};
 use spherule_surface::{MaterialId, OwnedBody};
-
-/// Rows of the bright cap around the zenith, of 256.
-const CAP_ROWS: usize = 9;
 
 /// A ball at this height: one of glass is above an opaque one, which is white.
 fn ball(z: f32) -> Balls {
@@ -43,16 +39,6 @@ fn scene(environment: Environment, lights: Vec<Light>) -> Scene {
     scene
 }
 
-fn sun(half_angle: f64, irradiance: f32) -> Light {
-    Light {
-        kind: LightKind::Sun { to_light: Vec3::Z, half_angle },
-        radiance: Vec3::splat(irradiance),
-        casts_shadow: true,
-        is_visible: false,
-        group: 0,
-    }
-}
-
 fn image(scene: &Scene, photons: u32, samples: u32) -> Film {
     let settings = RenderSettings { photons, max_depth: 8, ..settings(32, samples, 0) };
     let material = MaterialId::at(MaterialId::BASIC).unwrap();
@@ -68,28 +54,12 @@ fn image(scene: &Scene, photons: u32, samples: u32) -> Film {
     render(&[&ball(1.3), &opaque], scene, &source, &settings, &never).unwrap().0
 }
 
-/// Means of the red parts of squares of four by four pixels.
-fn blocks(film: &Film) -> Vec<f32> {
-    let pixel = |x: usize, y: usize| film.color[32 * y + x][0];
-    let mean = |block: usize| {
-        let [x, y] = [block % 8, block / 8].map(|i| 4 * i);
-        (0..16).map(|i| pixel(x + i % 4, y + i / 4)).sum::<f32>() / 16.0
-    };
-    (0..64).map(mean).collect()
-}
-
 // 1,000,000 photons, and paths with 1,024 samples a pixel: the noise of both has to be small.
 #[test]
 fn an_opaque_particle_has_the_caustic_of_path_tracing() {
-    // A large sun at the zenith, as an environment that paths find, and as a light
-    let mut pixels = vec![Vec3::ZERO; 512 * 256];
-    pixels[..512 * CAP_ROWS].fill(Vec3::splat(100.0));
-    let map = RadianceMap::new(512, 256, pixels).unwrap();
-    let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
-    let environment = Environment::from_map(axes, &map, Vec3::ONE);
-    let irradiance = environment.irradiance(Vec3::Z).x;
-    let half_angle = std::f64::consts::PI * CAP_ROWS as f64 / 256.0;
-    let dark = || Environment::constant(Vec3::ZERO);
+    // The sun as an environment, and as a light
+    let (environment, half_angle) = large_sun();
+    let irradiance = environment.irradiance(Vec3::Z);
     let expected = image(&scene(environment, Vec::new()), 0, 1024);
     let lit = scene(dark(), vec![sun(half_angle, irradiance)]);
     let found = image(&lit, 1_000_000, 64);

@@ -29,7 +29,7 @@ const fn ball(x: f32) -> Ball {
 /// The colours of a style.
 type Own = Colors<'static>;
 
-/// The balls, of which the last ones have styles.
+/// A scene of the balls. If there are fewer colours than balls, the last balls have the styles.
 struct Styled {
     scene: Scene,
     colors: Vec<Own>,

@@ -213,7 +213,7 @@ impl Times2 {
                 let difference = near(500, 4)?;
                 sequence.add_extreme(difference);
             }
-            // Negative multiples, the last of which stands for all that are smaller
+            // Negative multiples of the step: -1 to -9, and -10 for all below
             501..510 => {
                 let difference = near(500 - symbol.cast_signed(), 5)?;
                 sequence.add(difference);
