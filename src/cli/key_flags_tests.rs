@@ -33,7 +33,7 @@ const LISTS: [&str; 12] = [
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 69] = [
+const FLAGS: [(&str, &str); 70] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -58,6 +58,7 @@ const FLAGS: [(&str, &str); 69] = [
     ("--vmin 0 --vmax 2", "material.color.range = [0.0, 2.0]"),
     ("--samples 7", "image.samples = 7"),
     ("--seed 7", "render.seed = 7"),
+    ("--noise 0.02", "render.noise = 0.02"),
     ("--crop 3,4,50,60", "image.crop = [3, 4, 50, 60]"),
     ("--radius 0.5", "input.radius = 0.5"),
     ("--up -y", "input.up = \"-y\""),

@@ -12,7 +12,7 @@ use spherule_jobs::{FrameRange, Job};
 use super::job::{list, use_threads};
 use super::manifest_args::{ManifestArgs, complete, open_sequence};
 use super::paths::absolute;
-use super::render::{clamped_text, print_summary};
+use super::render::{print_summary, sampling_notes};
 use super::{CliError, Outcome, disk, print, signals};
 use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
 use crate::manifest::Look;
@@ -166,7 +166,7 @@ fn report(
 ) -> Result<Outcome, CliError> {
     match rendered {
         Ok(report) => {
-            if let Some(text) = clamped_text(&report) {
+            for text in sampling_notes(&report) {
                 note!("{text}");
             }
             print::lines([format!(

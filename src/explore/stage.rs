@@ -25,7 +25,7 @@ use crate::survey::Survey;
 const DRAFT_PHOTONS: u32 = 50_000;
 
 /// Beginnings of keys that need no other particles and no other tree.
-const SHADING_KEYS: [&str; 25] = [
+const SHADING_KEYS: [&str; 26] = [
     "camera.",
     "image.",
     "output.",
@@ -49,6 +49,7 @@ const SHADING_KEYS: [&str; 25] = [
     "render.ground",
     "render.haze",
     "render.max_depth",
+    "render.noise",
     "render.outline",
     "render.seed",
 ];
@@ -470,6 +471,8 @@ fn reduced(setup: &Setup, level: &Level) -> Setup {
     render.window = render.window.map(|window| scaled(window, scale));
     [render.width, render.height] = level.size;
     render.samples = level.samples;
+    // The picture is refined level by level, all of it alike
+    render.noise = None;
     // The noise of one sample cannot be measured
     if level.samples == 1 && !level.is_last {
         render.has_features = false;

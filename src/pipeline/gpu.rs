@@ -199,6 +199,7 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Holdout => "mesh",
         Missing::Detail => "environment.detail",
         Missing::Clamp => "render.clamp",
+        Missing::Noise => "render.noise",
         Missing::MirroredCatcher => "render.ground",
     }
 }

@@ -230,7 +230,10 @@ impl Trial {
         let settings = &mut setup.picture.render;
         settings.mosaic_of = Some([settings.width, settings.height]);
         (settings.width, settings.height) = (width, height);
-        settings.samples = settings.samples.min(MAX_SAMPLES);
+        // With a limit of noise, the number follows from it
+        if settings.noise.is_none() {
+            settings.samples = settings.samples.min(MAX_SAMPLES);
+        }
         let channels = settings.channels;
         // Trace it until the deadline
         let start = Instant::now();

@@ -19,7 +19,7 @@ use crate::accel::{BuildReport, TreeBuilder};
 use crate::output::TextAttribute;
 use crate::render::{Film, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
-use crate::report::frame::FileBytes;
+use crate::report::frame::{FileBytes, SamplingSummary};
 use crate::scene::material::DEFAULT_COLOR;
 
 /// Renders frame after frame in the same buffers, on the threads of the current pool.
@@ -111,6 +111,7 @@ impl FrameRenderer for CpuRenderer {
         let mut report = frame.report.clone();
         report.seconds.trace = seconds(start.elapsed());
         report.clamped_light = rays.lost.part(&film.color, setup.picture.render.samples);
+        report.sampling = sampling(&film, setup, &rays);
         report.rays = rays.into();
         Ok(TracedFrame {
             camera: setup.camera_at(frame.task.frame)?,
@@ -204,6 +205,14 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
             mattes::attributes(setup, &stored.shading(picture, DEFAULT_COLOR), count)
         }
     }
+}
+
+/// The samples of `film`, if its noise is limited.
+fn sampling(film: &Film, setup: &Setup, rays: &RayCounts) -> Option<SamplingSummary> {
+    let pixels = film.color.len() as f64;
+    let part = |of: u64| if pixels > 0.0 { of as f64 / pixels } else { 0.0 };
+    let summary = SamplingSummary { samples: part(rays.kept), noisy: part(rays.noisy_pixels) };
+    setup.picture.render.noise.map(|_| summary)
 }
 
 fn seconds(time: Duration) -> f64 {

@@ -38,6 +38,7 @@ pub(super) fn render_settings(
     Ok(RenderSettings {
         window: whole.part().map(|_| whole.data_window()),
         samples: image.samples,
+        noise: manifest.noise_limit(),
         seed: render.seed,
         filter: PixelFilter {
             kind: image.filter,

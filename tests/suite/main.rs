@@ -6,6 +6,7 @@ mod picture_formats;
 mod placement;
 mod simd;
 
+mod adaptive;
 mod architecture;
 mod arithmetic;
 mod arrows;

@@ -56,6 +56,8 @@ pub enum Missing {
     Detail,
     /// A clamp of indirect light.
     Clamp,
+    /// A limit of noise.
+    Noise,
     /// Metal or plastic that sees the environment through a shadow catcher.
     MirroredCatcher,
 }
@@ -76,6 +78,7 @@ impl fmt::Display for Missing {
             Self::Holdout => "holdouts",
             Self::Detail => "an image of the environment at its own resolution",
             Self::Clamp => "a clamp of indirect light",
+            Self::Noise => "a limit of noise",
             Self::MirroredCatcher => {
                 "metal and plastic above a shadow catcher without a background"
             }
@@ -106,6 +109,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (material.is_holdout, Missing::Holdout),
         (scene.environment.as_ref().is_some_and(|map| map.has_detail()), Missing::Detail),
         (settings.clamp.is_some() && !is_whitted, Missing::Clamp),
+        (settings.noise.is_some(), Missing::Noise),
         (mirrors_see_through(scene, settings) && !is_whitted, Missing::MirroredCatcher),
     ]
     .into_iter()
@@ -332,6 +336,8 @@ pub const fn ray_counts(cost: &Cost) -> RayCounts {
         reflection: cost.reflected_rays,
         refraction: 0,
         lost: LostLight::NONE,
+        kept: 0,
+        noisy_pixels: 0,
     }
 }
 

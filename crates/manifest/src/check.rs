@@ -42,7 +42,7 @@ pub(super) const RULES: &[Rule] = rules! {
     "camera.stereo" Is["true"] => "image.overscan" MissingOr["0"]: RENDERED_AS_A_WHOLE;
     "job.follow" Is["true"] => "trails.frames" MissingOr["0"]:
         "earlier frames may be completed later when job.follow is set; render the sequence when it is complete";
-    "image.samples" Is["1"] => "render.denoise" MissingOrNot["true"]:
+    "image.samples" Is["1"], "render.noise" MissingOr["off"] => "render.denoise" MissingOrNot["true"]:
         "needs at least 2 samples per pixel (image.samples), whose difference is the noise";
     // Each surface has options of its own
     "render.surface" MissingOr["spheres"] => "surface.normals" MissingOrNot["field"]:

@@ -37,7 +37,7 @@ use std::path::Path;
 use spherule_images::overlay::Layout;
 use spherule_selection::{Condition, Selection};
 use spherule_surface::{SprayStyle, SurfaceKind, SurfaceSettings};
-use spherule_tracer::render::{FilmPlane, IntegratorKind};
+use spherule_tracer::render::{FilmPlane, IntegratorKind, NoiseLimit};
 use spherule_tracer::scene::Fresnel;
 
 use key::Affects;
@@ -427,6 +427,12 @@ impl Manifest {
     /// The integrator of the images.
     pub fn integrator(&self) -> IntegratorKind {
         self.render.integrator.unwrap_or(IntegratorKind::Path)
+    }
+
+    /// The limit of noise, if there is one.
+    pub fn noise_limit(&self) -> Option<NoiseLimit> {
+        let max_samples = self.image.max_samples;
+        self.render.noise.map(|noise| NoiseLimit { noise, max_samples })
     }
 
     /// Whether rays at spheres split into reflected and refracted ones; `render.min_weight` has no effect otherwise.

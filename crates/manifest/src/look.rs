@@ -68,6 +68,7 @@ render.ground = false
 /// A quick preview: few samples, and paths that end at the second surface. [`draft`] lays it over a manifest.
 const DRAFT: &str = r#"
 image.samples = 4
+render.noise = "off"
 render.indirect = "ambient"
 render.denoise = "auto"
 "#;

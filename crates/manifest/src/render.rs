@@ -4,9 +4,9 @@ use glam::Vec3;
 use spherule_files::Bytes;
 use spherule_images::overlay::Layout;
 use spherule_tracer::render::{
-    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
-    MAX_CLAMP, MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SEED, MAX_SIDE, MIN_WEIGHTS,
-    RendererKind,
+    DEFAULT_BOUNCES, DEFAULT_MAX_SAMPLES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind,
+    IntegratorKind, MAX_BOUNCES, MAX_CLAMP, MAX_DEPTH, MAX_FILTER_WIDTH, MAX_NOISE, MAX_SAMPLES,
+    MAX_SEED, MAX_SIDE, MIN_WEIGHTS, RendererKind,
 };
 use spherule_tracer::scene::{Background, ground};
 use spherule_tree::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
@@ -41,6 +41,8 @@ section! {
             unset("not stored; 300 if a side is a length on paper"), flag("dpi", "DPI", "Image");
         /// Samples per pixel
         samples: u32 = 16, from(1), to(MAX_SAMPLES), flag("samples", "SAMPLES", "Image");
+        /// Maximum number of samples per pixel, where render.noise limits noise
+        max_samples: u32 = DEFAULT_MAX_SAMPLES, from(1), to(MAX_SAMPLES);
         /// Pixel filter: box | gaussian | blackman-harris
         ///
         /// The samples of a pixel are distributed like the filter and have equal weights. A single sample is at the
@@ -265,6 +267,12 @@ section! {
         /// default of Blender.
         clamp: Option<f32> = None, or("off"), above(0), to(MAX_CLAMP), unit("a radiance"),
             affects(Affects::PathTracing);
+        /// Limit of noise: tiles of 16x16 pixels take more samples until their noise is below it, or off
+        ///
+        /// The noise is measured before denoising, and relative to white: 0.02 is hardly seen, 0.1 suits pictures that are
+        /// denoised. A tile takes at least image.samples and at most image.max_samples, and equals that of an image with its
+        /// number. It is an estimate, which rare bright samples escape.
+        noise: Option<f32> = None, or("off"), above(0), to(MAX_NOISE), unit("a part of white"), flag("noise", "LIMIT", "Look");
         /// Sequence of the random numbers
         ///
         /// Images that differ only in it have the same mean and independent noise, so several of them can be averaged:

@@ -23,6 +23,9 @@ pub struct FrameReport {
     pub clamped_pixels: u64,
     /// Part of the light of the image that `render.clamp` took away, 0 to 1.
     pub clamped_light: f64,
+    /// The samples of an image with a limit of noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<SamplingSummary>,
     /// Time by stage.
     pub seconds: StageSeconds,
     /// The acceleration structure.
@@ -36,6 +39,16 @@ pub struct FrameReport {
     /// The GPU that rendered it, if one did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<DeviceSummary>,
+}
+
+/// An image whose noise is limited (`render.noise`).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SamplingSummary {
+    /// Mean number of samples of a pixel.
+    pub samples: f64,
+    /// Part of the image that has the maximum number of samples and more noise, 0 to 1.
+    pub noisy: f64,
 }
 
 /// A picture on a GPU. Times are seconds on its own clock, 0 if it has none.

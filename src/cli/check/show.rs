@@ -101,7 +101,7 @@ impl Check<'_> {
             width,
             height,
             manifest.image.part().map(|part| format!(", part {part:?}")).unwrap_or_default(),
-            counted(manifest.image.samples as usize, "sample"),
+            samples_text(manifest),
             names.join(" "),
             if manifest.output.has_previews() { ", with previews" } else { "" }
         ));
@@ -217,12 +217,24 @@ fn structure(survey: &Survey, setup: &Setup) -> Structure {
     setup.build_settings(survey.most_particles, has_values).structure
 }
 
+fn samples_text(manifest: &Manifest) -> String {
+    let samples = manifest.image.samples;
+    match manifest.noise_limit() {
+        None => counted(samples as usize, "sample"),
+        Some(limit) => {
+            let most = limit.max_samples.max(samples);
+            format!("{samples} to {most} samples (noise {})", limit.noise)
+        }
+    }
+}
+
 fn image_json(manifest: &Manifest) -> Value {
     let [width, height] = manifest.picture().size();
     let mut image = json!({
         "width": width,
         "height": height,
         "samples": manifest.image.samples,
+        "noise": manifest.render.noise,
         "channels": channels(manifest),
         "preview": manifest.output.has_previews(),
     });

@@ -22,9 +22,9 @@ impl ShowReport for FrameReport {
             none if none < 5e-4 => String::new(),
             seconds => format!("surface {seconds:.3} s, "),
         };
-        let clamped = clamped_text(self).map_or(String::new(), |text| format!(", {text}"));
+        let notes: String = sampling_notes(self).iter().map(|text| format!(", {text}")).collect();
         format!(
-            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s{clamped}",
+            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s{notes}",
             self.particles, self.build.structure, s.build, s.trace
         )
     }
@@ -34,10 +34,23 @@ impl ShowReport for FrameReport {
     }
 }
 
-/// How much light a picture has lost to the clamp of indirect light.
-pub(in crate::cli) fn clamped_text(report: &FrameReport) -> Option<String> {
+/// How many samples a picture with a limit of noise took, and how much light it has lost to the clamp of indirect light.
+pub(in crate::cli) fn sampling_notes(report: &FrameReport) -> Vec<String> {
+    let mut notes = Vec::new();
+    if let Some(sampling) = &report.sampling {
+        let noisy = match 100.0 * sampling.noisy {
+            percent if percent > 0.0 => {
+                format!("; {percent:.1} % of the picture still have more noise (image.max_samples)")
+            }
+            _ => String::new(),
+        };
+        notes.push(format!("{:.1} samples per pixel{noisy}", sampling.samples));
+    }
     let percent = 100.0 * report.clamped_light;
-    (percent > 0.0).then(|| format!("render.clamp took {percent:.2} % of the light"))
+    if percent > 0.0 {
+        notes.push(format!("render.clamp took {percent:.2} % of the light"));
+    }
+    notes
 }
 
 /// Prints the resolved settings.

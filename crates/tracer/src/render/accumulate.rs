@@ -22,9 +22,12 @@ impl SampleGroup {
             // Store them with the data of the pixel, the mean of odd samples for the denoiser, and the layers
             tile.set_color(pixel.column, pixel.row, color);
             tile.set_data(pixel.column, pixel.row, &pixel.data);
-            if tile.has_odd() {
-                let mean = self.odd_mean(number * samples, samples, is_bounded);
-                tile.set_odd(pixel.column, pixel.row, mean);
+            if tile.has_odd() || self.noise.is_some() {
+                let odd = self.odd_mean(number * samples, samples);
+                tile.set_odd(pixel.column, pixel.row, bounded(odd, is_bounded));
+                if let Some(noise) = &mut self.noise {
+                    noise.add(mean, odd);
+                }
             }
             if !layers.is_empty() {
                 let pixel = (&mut *tile, [pixel.column, pixel.row]);
@@ -35,14 +38,14 @@ impl SampleGroup {
     }
 
     /// The mean of every second of the `samples` from `first + 1` on.
-    fn odd_mean(&self, first: usize, samples: usize, is_bounded: bool) -> [f32; 4] {
+    fn odd_mean(&self, first: usize, samples: usize) -> [f32; 4] {
         let odd = (first + 1..first + samples).step_by(2);
         let share = (samples / 2).max(1) as f32;
         let radiance = |sample: usize| lane3(&self.radiance[sample / LANES], sample % LANES);
         let mean = odd.clone().map(radiance).sum::<Vec3>() / share;
         let covered = |sample: usize| self.coverage[sample / LANES][sample % LANES];
         let coverage = odd.map(covered).sum::<f32>() / share;
-        bounded(mean.extend(coverage).to_array(), is_bounded)
+        mean.extend(coverage).to_array()
     }
 }
 

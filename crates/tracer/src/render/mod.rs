@@ -14,6 +14,7 @@ use spherule_surface::{MaterialId, Shape};
 
 mod absorption;
 mod accumulate;
+mod adaptive;
 mod aov;
 mod attributes;
 mod bodies;
@@ -41,6 +42,7 @@ mod light_split;
 mod lights;
 mod near_photons;
 mod nested;
+mod noise;
 mod outline;
 mod panes;
 mod path;
@@ -65,6 +67,8 @@ mod visibility;
 mod whitted;
 mod window;
 
+#[cfg(test)]
+mod adaptive_tests;
 #[cfg(test)]
 mod body_tests;
 #[cfg(test)]
@@ -125,9 +129,9 @@ pub use planes::FilmPlane;
 pub use ray_counts::{LostLight, RayCounts};
 pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
-    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IndirectLight, IntegratorKind,
-    MAX_BOUNCES, MAX_CLAMP, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SEED,
-    MAX_SIDE, MIN_WEIGHTS, RenderError, RenderSettings,
+    DEFAULT_BOUNCES, DEFAULT_MAX_SAMPLES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IndirectLight,
+    IntegratorKind, MAX_BOUNCES, MAX_CLAMP, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_NOISE, MAX_PHOTONS,
+    MAX_SAMPLES, MAX_SEED, MAX_SIDE, MIN_WEIGHTS, NoiseLimit, RenderError, RenderSettings,
 };
 pub use source::mean;
 pub use source::opacity_of;
@@ -135,6 +139,7 @@ pub use source::{Colors, Opacities, ParticleShading, ShadeSource, StyleShading};
 pub use stop::{Deadline, Stop};
 pub use window::DataWindow;
 
+use adaptive::Passes;
 use context::RenderContext;
 use integrator::Integrator;
 use path::PathIntegrator;
@@ -171,13 +176,14 @@ pub fn scratch_bytes(
 ) -> u64 {
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
-    scratch::scratch_bytes(settings.samples, max_depth, max_paths, &settings.channels)
+    let most = settings.last_pass().samples;
+    scratch::scratch_bytes(most, max_depth, max_paths, &settings.channels)
         + stream::bytes_of_slices(slices)
 }
 
 /// Upper bounds of the memory for the light of photons and on the ground around transmissive particles.
 pub fn ground_light_bytes(scene: &Scene, settings: &RenderSettings) -> GroundLightBytes {
-    path::ground::bytes(scene, settings)
+    path::ground::bytes(scene, &settings.last_pass())
 }
 
 /// Renders one image on the current rayon pool.
@@ -233,14 +239,17 @@ pub fn render_into(
     film.fit(width, height, channels, has_features);
     let plane = scene.ground.as_ref().map(Ground::shape);
     let ground = plane.iter().map(|plane| plane as &dyn Shape);
-    let shapes = ground.chain(shapes.iter().copied()).collect();
-    let context = RenderContext::new(shapes, scene, source, settings);
-    let (integrator, before) = integrator_of(context, settings, stop)?;
+    let shapes: Vec<_> = ground.chain(shapes.iter().copied()).collect();
+    let passes = settings.passes();
+    let contexts =
+        passes.iter().map(|pass| RenderContext::new(shapes.clone(), scene, source, pass));
+    let (integrators, before) = integrators_of(contexts.collect(), settings, stop)?;
+    let passes = Passes { integrators, limit: settings.noise };
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // Reuse scratch memory: there is one per thread, and all are released at the end of the image
         let mut own = lock(&scratch).pop().unwrap_or_default();
-        let counts = integrator.render_tile(tile, stop, &mut own);
+        let counts = passes.render_tile(tile, stop, &mut own);
         lock(&scratch).push(own);
         counts.ok_or(RenderError::Interrupted)
     };
@@ -272,22 +281,25 @@ fn validate_bodies(shapes: &[&dyn Shape], scene: &Scene) -> Result<(), RenderErr
     }
 }
 
-/// The integrator of the settings, and the rays that were traced to prepare it.
-fn integrator_of<'a>(
-    context: RenderContext<'a>,
+/// The integrators of the settings in `contexts`, with more and more samples, and the rays that were traced to prepare
+/// them.
+fn integrators_of<'a>(
+    mut contexts: Vec<RenderContext<'a>>,
     settings: &RenderSettings,
     stop: &dyn Stop,
-) -> Result<(Box<dyn Integrator + 'a>, RayCounts), RenderError> {
-    match settings.integrator {
-        IntegratorKind::Whitted => {
-            Ok((Box::new(WhittedIntegrator::new(context)), RayCounts::default()))
-        }
-        IntegratorKind::Path => {
-            let (integrator, traced) =
-                PathIntegrator::new(context).with_photons(stop).ok_or(RenderError::Interrupted)?;
-            Ok((Box::new(integrator), traced))
-        }
+) -> Result<(Vec<Box<dyn Integrator + 'a>>, RayCounts), RenderError> {
+    if settings.integrator == IntegratorKind::Whitted {
+        let of = |context| Box::new(WhittedIntegrator::new(context)) as Box<dyn Integrator + 'a>;
+        return Ok((contexts.into_iter().map(of).collect(), RayCounts::default()));
     }
+    // All share the light of photons, which is that of the most samples
+    let last = contexts.pop().expect("there is a pass");
+    let (last, traced) =
+        PathIntegrator::new(last).with_photons(stop).ok_or(RenderError::Interrupted)?;
+    let of = |context| Box::new(PathIntegrator::with_light_of(context, &last)) as Box<_>;
+    let mut integrators: Vec<Box<dyn Integrator + 'a>> = contexts.into_iter().map(of).collect();
+    integrators.push(Box::new(last));
+    Ok((integrators, traced))
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {

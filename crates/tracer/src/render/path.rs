@@ -12,6 +12,8 @@
 //! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent. Where photons
 //! bring the light of a source through transmissive surfaces (`path/caustics.rs`), its shadow rays end there.
 
+use std::sync::Arc;
+
 use super::{
     body_set::BodySet,
     bsdf::{Bsdf, bsdf_of, reflect_samples, surface_points},
@@ -69,9 +71,9 @@ pub(super) struct PathIntegrator<'a> {
     /// The light of second surfaces, if paths end there.
     ambient: Option<AmbientLight>,
     /// The light on the ground, if paths end there.
-    ground_light: Option<GroundLight>,
+    ground_light: Option<Arc<GroundLight>>,
     /// The light of photons on other surfaces.
-    caustics: Caustics,
+    caustics: Arc<Caustics>,
 }
 
 impl<'a> PathIntegrator<'a> {
@@ -89,9 +91,18 @@ impl<'a> PathIntegrator<'a> {
             split: SplitRule::new(context.settings, context.shapes.interior),
             catcher: Catcher::of(context.scene, context.settings),
             ground_light: None,
-            caustics: Caustics::default(),
+            caustics: Arc::default(),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
+        }
+    }
+
+    /// Same as [`Self::new`], with the light of photons of `other`.
+    pub(super) fn with_light_of(context: RenderContext<'a>, other: &Self) -> Self {
+        Self {
+            ground_light: other.ground_light.clone(),
+            caustics: Arc::clone(&other.caustics),
+            ..Self::new(context)
         }
     }
 }

@@ -30,6 +30,12 @@ impl LostLight {
         lost / (lost + kept.max(0.0))
     }
 
+    /// The light of a tile with `samples` per pixel, as it would be with `others`.
+    pub(super) fn of_samples(self, samples: u32, others: u32) -> Self {
+        let scaled = u128::from(self.0) * u128::from(others) / u128::from(samples.max(1));
+        Self(u64::try_from(scaled).unwrap_or(u64::MAX))
+    }
+
     const fn plus(self, other: Self) -> Self {
         Self(self.0.saturating_add(other.0))
     }
@@ -48,12 +54,21 @@ pub struct RayCounts {
     pub refraction: u64,
     /// Light that the clamp of indirect light took away.
     pub lost: LostLight,
+    /// Adaptive sampling: camera rays whose samples are in the picture. The others found out how many are needed.
+    pub kept: u64,
+    /// Adaptive sampling: pixels of tiles that have the most samples and are still above the limit of noise.
+    pub noisy_pixels: u64,
 }
 
 impl RayCounts {
     /// Number of all rays.
     pub const fn total(&self) -> u64 {
         self.primary + self.shadow + self.reflection + self.refraction
+    }
+
+    /// The same rays, without lost light.
+    pub(super) const fn without_lost(self) -> Self {
+        Self { lost: LostLight::NONE, ..self }
     }
 }
 
@@ -67,6 +82,8 @@ impl std::ops::Add for RayCounts {
             reflection: self.reflection + other.reflection,
             refraction: self.refraction + other.refraction,
             lost: self.lost.plus(other.lost),
+            kept: self.kept + other.kept,
+            noisy_pixels: self.noisy_pixels + other.noisy_pixels,
         }
     }
 }

@@ -14,6 +14,7 @@ use super::{
     light_split::LightSplit,
     lights::LightSamples,
     near_photons::{NEIGHBOURS, NearPhoton, NearPhotons, Neighbour},
+    noise::TileNoise,
     ray_counts::RayCounts,
     sample_layers::SampleLayers,
     sampler::PathSeed,
@@ -56,6 +57,8 @@ pub(super) struct SampleGroup {
     pub(super) coverage: Vec<Lanes>,
     /// Contributions to the layers of the film.
     pub(super) layers: SampleLayers,
+    /// The noise of the tile, if it is measured.
+    pub(super) noise: Option<TileNoise>,
 }
 
 /// A pixel of a group, and its data.

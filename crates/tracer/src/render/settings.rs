@@ -37,6 +37,12 @@ pub const DEFAULT_BOUNCES: u32 = 6;
 /// Largest limit of indirect light, a radiance. 1 is that of a white surface under the default light.
 pub const MAX_CLAMP: f32 = 1e6;
 
+/// Largest limit of noise.
+pub const MAX_NOISE: f32 = 10.0;
+
+/// Default maximum number of samples per pixel with a limit of noise.
+pub const DEFAULT_MAX_SAMPLES: u32 = 1024;
+
 /// Maximum number of photons.
 pub const MAX_PHOTONS: u32 = 1_000_000_000;
 
@@ -45,6 +51,9 @@ pub const DEFAULT_PHOTONS: u32 = 500_000;
 
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 65_536;
+
+/// Least number of samples of a pass with a limit of noise: the noise of fewer is not known.
+const MIN_SAMPLES: u32 = 4;
 
 /// Methods to compute the radiance along rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -69,6 +78,15 @@ pub enum IndirectLight {
     },
 }
 
+/// How much noise a picture may have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseLimit {
+    /// Noise of a tile of 16x16 pixels, relative to white.
+    pub noise: f32,
+    /// Maximum number of samples per pixel.
+    pub max_samples: u32,
+}
+
 /// Settings of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderSettings {
@@ -78,6 +96,8 @@ pub struct RenderSettings {
     pub height: u32,
     /// Samples per pixel; a single one is exactly at the centre of the pixel.
     pub samples: u32,
+    /// Adaptive sampling: the noise above which tiles take more samples.
+    pub noise: Option<NoiseLimit>,
     /// Sequence of the random numbers. Pictures that differ only in it have the same mean and independent noise.
     pub seed: u32,
     /// How the samples are distributed around the centre of the pixel.
@@ -123,6 +143,7 @@ impl RenderSettings {
             width,
             height,
             samples: 1,
+            noise: None,
             seed: 0,
             filter: PixelFilter::BOX,
             integrator: IntegratorKind::Whitted,
@@ -171,6 +192,23 @@ impl RenderSettings {
         self.channels.with_features(self.has_features)
     }
 
+    /// The settings of the passes that a tile may take, with more and more samples; all are even numbers.
+    pub(super) fn passes(&self) -> Vec<Self> {
+        let Some(limit) = self.noise else {
+            return vec![*self];
+        };
+        let first = self.samples.max(MIN_SAMPLES).next_multiple_of(2);
+        let most = first.max(limit.max_samples / 2 * 2);
+        let more = |samples: &u32| Some((samples + samples / 3).next_multiple_of(2));
+        let fewer = std::iter::successors(Some(first), more).take_while(|samples| *samples < most);
+        fewer.chain([most]).map(|samples| Self { samples, noise: None, ..*self }).collect()
+    }
+
+    /// The settings of the pass with the most samples.
+    pub(super) fn last_pass(&self) -> Self {
+        self.passes().pop().unwrap_or(*self)
+    }
+
     /// Checks that all settings are in their ranges.
     ///
     /// # Errors
@@ -184,6 +222,7 @@ impl RenderSettings {
             ("width", full_width, MAX_SIDE),
             ("height", full_height, MAX_SIDE),
             ("samples", self.samples, MAX_SAMPLES),
+            ("max_samples", self.noise.map_or(1, |limit| limit.max_samples), MAX_SAMPLES),
             ("max_depth", self.max_depth, MAX_DEPTH),
         ] {
             if !(1..=max).contains(&value) {
@@ -204,6 +243,11 @@ impl RenderSettings {
         }
         if let Some(clamp) = self.clamp.filter(|clamp| !(*clamp > 0.0 && *clamp <= MAX_CLAMP)) {
             return Err(RenderError::Clamp(clamp));
+        }
+        if let Some(limit) =
+            self.noise.filter(|limit| !(limit.noise > 0.0 && limit.noise <= MAX_NOISE))
+        {
+            return Err(RenderError::Noise(limit.noise));
         }
         if self.bounces > MAX_BOUNCES {
             return Err(RenderError::TooManyBounces(self.bounces));
@@ -275,6 +319,9 @@ pub enum RenderError {
     /// `clamp` is out of range.
     #[error("clamp = {0} is out of range; it must be above 0 and at most {MAX_CLAMP:e}")]
     Clamp(f32),
+    /// The limit of noise is out of range.
+    #[error("noise = {0} is out of range; it must be above 0 and at most {MAX_NOISE}")]
+    Noise(f32),
     /// A light is in a group without a layer.
     #[error("a light is in light group {group}, but there are only {count} light groups")]
     LightGroup {

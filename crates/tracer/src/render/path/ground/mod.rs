@@ -282,17 +282,16 @@ impl<'a> PathIntegrator<'a> {
         }
         // Make maps of them
         let [min, max] = scene.particles;
-        self.caustics.surfaces = collector.map(|photons| photons.into_map((max - min).length()));
+        let surfaces = collector.map(|photons| photons.into_map((max - min).length()));
         let caustics = square.zip(cells).map(|(square, cells)| cells.into_map(square));
-        if catcher.is_some() {
-            self.caustics.catcher = caustics;
-            return Some((self, counts));
-        }
+        let [of_catcher, of_ground] =
+            if catcher.is_some() { [caustics, None] } else { [None, caustics] };
+        self.caustics = Arc::new(Caustics { surfaces, catcher: of_catcher });
         // Add the light of the environment on a visible ground
-        if let (Some(ground), Some(caustics)) = (visible, caustics) {
+        if let (Some(ground), Some(caustics)) = (visible, of_ground) {
             let (light, of_sky) = self.ground_light(ground, caustics, stop)?;
             counts = counts + of_sky;
-            self.ground_light = Some(light);
+            self.ground_light = Some(Arc::new(light));
         }
         Some((self, counts))
     }

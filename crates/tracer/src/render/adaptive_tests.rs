@@ -1,0 +1,133 @@
+//! Tiles that take more samples than others.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::AtomicBool;
+
+use glam::Vec3;
+
+use super::path_tests::{floor_from_above, settings};
+use super::{brute::Balls, *};
+use crate::scene::{Environment, Finish, Light, LightKind};
+
+/// A metal ball under a sun in a grey sky: the floor near the ball is noisy, and that far away is not.
+fn scene() -> Scene {
+    let mut scene = floor_from_above(Environment::constant(Vec3::splat(0.2)), Vec3::splat(0.5));
+    scene.particle_material_mut().finish = Finish::Metal { roughness: 0.2 };
+    scene.lights = vec![Light {
+        kind: LightKind::Sun { to_light: Vec3::new(1.0, 0.3, 1.0).normalize(), half_angle: 0.02 },
+        radiance: Vec3::splat(3.0),
+        casts_shadow: true,
+        is_visible: true,
+        group: 1,
+    }];
+    scene
+}
+
+/// A picture of several tiles, the last of which are not whole.
+fn large(samples: u32, noise: Option<NoiseLimit>) -> RenderSettings {
+    let mut channels =
+        Channels::from_names(["RGBA", "Z", "id", "lights", "crypto_material"]).unwrap();
+    channels.layers.set_light_groups(1);
+    RenderSettings {
+        width: 90,
+        height: 70,
+        noise,
+        channels,
+        has_features: true,
+        ..settings(90, samples, 4)
+    }
+}
+
+fn picture(settings: &RenderSettings) -> (Film, RayCounts) {
+    let (ball, source) = (Balls::one(Vec3::new(0.0, 0.0, 0.4), 0.4), Vec3::splat(0.8));
+    let (scene, never) = (scene(), AtomicBool::new(false));
+    render(&[&ball], &scene, &ParticleShading::constant(source), settings, &never).unwrap()
+}
+
+/// The bits of all planes of the pixels in the tile at `left` and `top`.
+fn tile_of(film: &Film, left: u32, top: u32) -> Vec<u32> {
+    let (right, bottom) = ((left + 16).min(film.width), (top + 16).min(film.height));
+    let rows = (top..bottom).flat_map(|y| (left..right).map(move |x| y * film.width + x));
+    let mut bits = Vec::new();
+    for pixel in rows.map(|pixel| pixel as usize) {
+        bits.extend(film.color[pixel].map(f32::to_bits));
+        bits.extend(film.odd.as_ref().unwrap()[pixel].map(f32::to_bits));
+        for plane in FilmPlane::all() {
+            let words = film.plane::<u32>(plane).unwrap_or_default();
+            let size = words.len() / film.color.len();
+            bits.extend(&words[pixel * size..(pixel + 1) * size]);
+        }
+    }
+    bits
+}
+
+#[test]
+fn tiles_equal_those_of_pictures_with_their_samples() {
+    let limit = NoiseLimit { noise: 0.03, max_samples: 100 };
+    let (film, counts) = picture(&large(4, Some(limit)));
+    let numbers = [4, 6, 8, 10, 14, 18, 24, 32, 42, 56, 74, 98, 100];
+    let plain = numbers.map(|samples| picture(&large(samples, None)).0);
+    let (mut used, mut kept) = (BTreeSet::new(), 0);
+    for (left, top) in
+        (0..70).step_by(16).flat_map(|top| (0..90).step_by(16).map(move |l| (l, top)))
+    {
+        let tile = tile_of(&film, left, top);
+        let number = plain.iter().position(|plain| tile_of(plain, left, top) == tile);
+        let samples = numbers[number.expect("the tile equals one of the pictures")];
+        used.insert(samples);
+        kept += u64::from(samples * (90 - left).min(16) * (70 - top).min(16));
+    }
+    assert!(used.len() >= 3 && used.contains(&4), "{used:?}");
+    assert_eq!(counts.kept, kept);
+    // The passes that are not kept cost less than those that are
+    assert!(counts.primary > kept && counts.primary < 2 * kept, "{} {kept}", counts.primary);
+}
+
+#[test]
+fn noise_is_below_the_limit() {
+    let limit = 0.03;
+    // The noise is an estimate, which rare bright samples escape
+    let clamped = |settings| RenderSettings { clamp: Some(1.0), ..settings };
+    let limits = NoiseLimit { noise: limit, max_samples: 4096 };
+    let (film, counts) = picture(&clamped(large(4, Some(limits))));
+    assert_eq!(counts.noisy_pixels, 0);
+    let (truth, _) = picture(&RenderSettings { seed: 7, ..clamped(large(1024, None)) });
+    let error = |a: &[f32; 4], b: &[f32; 4]| {
+        let brightness = ((b[0] + b[1] + b[2]) / 3.0).max(0.01);
+        let difference = (0..3).map(|axis| (a[axis] - b[axis]).abs()).sum::<f32>() / 3.0;
+        f64::from(difference * difference / brightness)
+    };
+    let errors = film.color.iter().zip(&truth.color).map(|(a, b)| error(a, b));
+    let mean = (errors.sum::<f64>() / film.color.len() as f64).sqrt();
+    assert!(mean < f64::from(limit) && mean > 0.2 * f64::from(limit), "{mean}");
+}
+
+#[test]
+fn the_number_of_samples_is_bounded() {
+    let limit = NoiseLimit { noise: 1e-6, max_samples: 13 };
+    let (film, counts) = picture(&large(5, Some(limit)));
+    let (plain, _) = picture(&large(12, None));
+    assert_eq!(film.color, plain.color);
+    assert_eq!(counts.kept, 12 * 90 * 70);
+    // Not even the empty background is free of noise in its coverage by the floor
+    assert!(counts.noisy_pixels > 0 && counts.noisy_pixels <= 90 * 70);
+    // A limit that nothing reaches, and fewer samples at most than at least
+    for max_samples in [64, 2] {
+        let limit = NoiseLimit { noise: 10.0, max_samples };
+        let (film, counts) = picture(&large(5, Some(limit)));
+        assert_eq!(film.color, picture(&large(6, None)).0.color);
+        assert_eq!((counts.kept, counts.noisy_pixels), (6 * 90 * 70, 0));
+    }
+}
+
+#[test]
+fn limits_out_of_range_are_errors() {
+    for noise in [0.0, -1.0, f32::NAN, 11.0] {
+        let settings = large(4, Some(NoiseLimit { noise, max_samples: 64 }));
+        assert!(matches!(settings.validate(), Err(RenderError::Noise(_))), "{noise}");
+    }
+    let settings = large(4, Some(NoiseLimit { noise: 0.1, max_samples: 5000 }));
+    let max = MAX_SAMPLES;
+    let expected = RenderError::OutOfRange { name: "max_samples", value: 5000, max };
+    assert_eq!(settings.validate(), Err(expected));
+}
