@@ -43,6 +43,21 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
         depth,
     };
     // Replace the colours, and with a transparent background the coverage
-    film.color = denoise(&input, settings)?;
+    let clean = denoise(&input, settings)?;
+    let noisy = std::mem::replace(&mut film.color, clean);
+    clear_shadows(film, &noisy);
     Ok(start.elapsed().as_secs_f64())
+}
+
+/// Gives the shadows on a shadow catcher what the coverage has gained, which is the shadows of objects whose own coverage
+/// has no noise. `noisy` are the colours before denoising.
+fn clear_shadows(film: &mut Film, noisy: &[[f32; 4]]) {
+    let color = std::mem::take(&mut film.color);
+    if let Some(arriving) = film.plane_mut::<[f32; 3]>(FilmPlane::ShadowCatcher) {
+        let coverage = noisy.iter().zip(&color).map(|(before, after)| before[3] - after[3]);
+        for (arriving, change) in arriving.iter_mut().zip(coverage) {
+            *arriving = arriving.map(|part| (part + change).max(0.0));
+        }
+    }
+    film.color = color;
 }

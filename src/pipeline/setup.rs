@@ -17,7 +17,7 @@ use crate::overlay::Overlay;
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
     Camera, CameraError, CameraPath, CameraView, ColorMap, Exposure, LensSettings, MaterialId,
-    NextFrame, Projection, RadiusTable, Scene, StereoSettings,
+    OtherFrame, Projection, RadiusTable, Scene, StereoSettings,
 };
 use crate::selection::{Division, Selection};
 use crate::surface::cut::ConvexRegion;
@@ -456,20 +456,17 @@ impl Setup {
             let point = focus.map(|point| self.picture.origin + point.as_dvec3());
             camera = camera.with_lens(lens.lens(&view, self.picture.view.aspect, point)?);
         }
-        let next_frame = match self.picture.step {
-            Some(step) => {
-                // Only views of frames in the sequence are checked in advance
-                let next = self.camera_at(frame.saturating_add(step.numbers));
-                Some(NextFrame {
-                    camera: next.or_else(|_| self.camera_at(frame))?,
-                    time: step.time,
-                })
-            }
-            None => None,
+        let other = |step: FrameStep| {
+            // Only views of frames in the sequence are checked in advance
+            let there = self.camera_at(frame.saturating_add(step.numbers));
+            let camera = there.or_else(|_| self.camera_at(frame))?;
+            Ok(OtherFrame { camera, time: step.time })
         };
+        let step = self.picture.step;
         Ok(Scene {
             camera,
-            next_frame,
+            next_frame: step.map(other).transpose()?,
+            previous_frame: step.map(FrameStep::back).map(other).transpose()?,
             exposure: self.exposure(frame, &camera),
             ..self.picture.scene.clone()
         })

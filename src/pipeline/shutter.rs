@@ -11,6 +11,13 @@ pub struct FrameStep {
     pub numbers: i64,
 }
 
+impl FrameStep {
+    /// The step of the same length to the previous frame.
+    pub(super) const fn back(self) -> Self {
+        Self { time: -self.time, numbers: self.numbers.saturating_neg() }
+    }
+}
+
 /// Motion blur: when the shutter is open, and how the particles move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shutter {

@@ -94,18 +94,20 @@ pub(super) fn frame_step(
     output: &Output,
     survey: &Survey,
 ) -> Result<Option<FrameStep>, ResolveError> {
-    if !channels.has(FilmPlane::Motion) {
+    let planes = [FilmPlane::Motion, FilmPlane::MotionBack];
+    let Some(plane) = planes.into_iter().find(|plane| channels.has(*plane)) else {
         return Ok(None);
-    }
+    };
+    let name = plane.name();
     let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
     if survey.most_particles > 0 && !has_velocities(survey) {
         return Err(unsupported(format!(
-            "motion needs velocities, and the sampled frames have none; available: {}",
+            "{name} needs velocities, and the sampled frames have none; available: {}",
             attribute_list(survey.attributes.iter().map(String::as_str))
         )));
     }
     let step = step_to_next(output, survey)
-        .ok_or_else(|| unsupported(format!("motion needs {UNKNOWN_STEP}")))?;
+        .ok_or_else(|| unsupported(format!("{name} needs {UNKNOWN_STEP}")))?;
     Ok(Some(step))
 }
 

@@ -56,6 +56,7 @@ pub(super) fn scene(
         is_environment_visible: manifest.environment.visible,
         environment_group: lights::group_index(manifest, manifest.environment.group.as_ref()),
         next_frame: None,
+        previous_frame: None,
         exposure: None,
     };
     scene.set_spray_soft(manifest.draws_soft_spray());

@@ -247,9 +247,13 @@ impl Manifest {
             );
             root.section("camera").wrong("stereo", &what);
         }
-        if self.output.channels.contains(&Channel::plane(FilmPlane::Motion)) {
-            let what = "motion is given, but stereo pairs have no such channel; remove it";
-            root.section("output").wrong("channels", what);
+        for plane in [FilmPlane::Motion, FilmPlane::MotionBack] {
+            if self.output.channels.contains(&Channel::plane(plane)) {
+                let name = plane.name();
+                let what =
+                    format!("{name} is given, but stereo pairs have no such channel; remove it");
+                root.section("output").wrong("channels", &what);
+            }
         }
     }
 

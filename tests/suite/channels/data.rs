@@ -72,6 +72,7 @@ fn unknown_attributes_are_refused_with_the_nearest_one() {
     refused("motion", &["output.channels", "set output.frame_time"]);
     write(&workshop, &["x,y,z,radius\n0,0,0,1\n"]);
     refused("motion", &["output.channels", "motion needs velocities"]);
+    refused("motion_back", &["output.channels", "motion_back needs velocities"]);
     write(&workshop, &["x,y,z,radius,A\n0,0,0,1,2\n"]);
     refused("attribute:A", &["two channels of the file would be called A"]);
 }
@@ -94,7 +95,7 @@ fn motion_leads_to_the_next_frame() {
     let header = "x,y,z,velocity_x,velocity_y,velocity_z,radius\n";
     let frame = |place: &str| format!("{header}{place},4,0,2,0.06\n");
     write(&workshop, &[&frame("0,0,0"), &frame("1,0,0.5")]);
-    let options = ["--channels", "motion,Z", "--set", "output.frame_time=0.25"];
+    let options = ["--channels", "motion,motion_back,Z", "--set", "output.frame_time=0.25"];
     // From far away, where the front of a sphere moves like its centre
     let still = ["--samples", "16", "--width", "256", "--height", "144", "--set", "camera.fov=10"];
     let first = rendered(&workshop, "out", &[&options[..], &still].concat());
@@ -111,6 +112,14 @@ fn motion_leads_to_the_next_frame() {
     }
     assert!(count > 20.0, "{count}");
     let length = expected[0].hypot(expected[1]);
+    // From the second frame, the same way back
+    for (axis, name) in ["motion_back.U", "motion_back.V"].iter().enumerate() {
+        let (z, plane) = (next.floats("Z"), next.floats(name));
+        let hit: Vec<f32> =
+            z.iter().zip(plane).filter(|(z, _)| z.is_finite()).map(|(_, v)| *v).collect();
+        let back = hit.iter().sum::<f32>() / hit.len() as f32;
+        assert!((back + expected[axis]).abs() < 0.05 * length, "{back} {expected:?}");
+    }
     assert!(length > 20.0, "{expected:?}");
     for axis in 0..2 {
         assert!(

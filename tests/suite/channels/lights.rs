@@ -102,6 +102,88 @@ fn light_channels_of_path_add_up() {
 }
 
 #[test]
+fn direct_light_has_one_interaction() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 6..=6);
+    let lit = |options: &[&str]| {
+        let noisy = [&["--set", "render.denoise=false"], options].concat();
+        let picture = picture(&workshop, "direct.exr", "RGBA,direct,indirect", &noisy);
+        let mut sums = [0.0; 2];
+        for axis in ["R", "G", "B"] {
+            let [direct, indirect] =
+                ["direct", "indirect"].map(|class| picture.floats(&format!("{class}.{axis}")));
+            for (pixel, color) in picture.floats(axis).iter().enumerate() {
+                let (direct, indirect) = (direct[pixel], indirect[pixel]);
+                let size = direct.abs() + indirect.abs();
+                assert!((direct + indirect - color).abs() <= 2e-3 * size + 1e-5, "{options:?}");
+                // A shadow catcher leaves some noise
+                assert!(direct > -0.05 && indirect > -5e-3, "{options:?}: {direct} {indirect}");
+                sums = [sums[0] + direct, sums[1] + indirect];
+            }
+        }
+        sums
+    };
+    let matte = [&["--look", "studio"], &MATTE[..]].concat();
+    let [direct, indirect] = lit(&matte);
+    // Most of it is the background
+    assert!(indirect > 0.005 * direct && indirect < 0.5 * direct, "{direct} {indirect}");
+    // Without further reflections, the same direct light alone
+    let [alone, none] = lit(&[&matte[..], &["--set", "render.bounces=0"]].concat());
+    assert!((alone / direct - 1.0).abs() < 0.01 && none.abs() < 0.01 * indirect, "{alone} {none}");
+    // What is seen through water has been refracted twice, and caustics come through it
+    let [direct, indirect] = lit(&["--look", "water"]);
+    assert!(indirect > 0.1 * direct, "{direct} {indirect}");
+    // The model of the thesis: reflected particles are indirect, reflected background is not
+    let whitted = ["--integrator", "whitted", "--set", "render.background=[1,1,1]"];
+    let [_, some] = lit(&whitted);
+    let [_, less] = lit(&[&whitted[..], &["--max-depth", "1"]].concat());
+    assert!(some > 0.0 && less == 0.0, "{some} {less}");
+}
+
+/// The shadow catcher of a studio: `shadow_catcher` times a plate is the plate with shadows.
+#[test]
+fn shadow_catchers_have_a_pass() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 6..=6);
+    let studio = ["--look", "studio", "--set", "render.background=[0.25,0.5,1]"];
+    let channels = "RGBA,shadow_catcher,id";
+    let noisy = [&studio[..], &["--set", "render.denoise=false"]].concat();
+    let opaque = picture(&workshop, "opaque.exr", channels, &noisy);
+    let clear = ["--set", "output.transparent=true"];
+    let transparent = picture(&workshop, "clear.exr", channels, &[&noisy[..], &clear].concat());
+    let clean = picture(&workshop, "clean.exr", channels, &[&studio[..], &clear].concat());
+    let pass = |picture: &Picture, axis| picture.floats(&format!("shadow_catcher.{axis}")).to_vec();
+    // The shadow in the coverage has its luminance
+    let [r, g, b] = ["R", "G", "B"].map(|axis| pass(&transparent, axis));
+    for (pixel, alpha) in transparent.floats("A").iter().enumerate() {
+        let arriving = 0.2126 * r[pixel] + 0.7152 * g[pixel] + 0.0722 * b[pixel];
+        if opaque.floats("A")[pixel] == 0.0 {
+            assert!((1.0 - arriving - alpha).abs() < 0.01, "{arriving} {alpha}");
+        }
+    }
+    let mut dark = 0;
+    for (axis, plate) in [("R", 0.25), ("G", 0.5), ("B", 1.0)] {
+        let arriving = pass(&opaque, axis);
+        assert_eq!(arriving, pass(&transparent, axis));
+        for (pixel, part) in arriving.iter().enumerate() {
+            if opaque.floats("A")[pixel] == 0.0 {
+                assert!((part * plate - opaque.floats(axis)[pixel]).abs() < 2e-3);
+                dark += usize::from(*part < 0.8);
+            } else if opaque.floats("A")[pixel] == 1.0 {
+                assert_eq!(*part, 1.0, "particles are no shadows");
+            }
+        }
+        // It is as clean as the coverage
+        let [noisy_alpha, clean_alpha] = [&transparent, &clean].map(|p| p.floats("A").to_vec());
+        for (pixel, part) in pass(&clean, axis).iter().enumerate() {
+            let expected = arriving[pixel] + noisy_alpha[pixel] - clean_alpha[pixel];
+            assert!((part - expected.max(0.0)).abs() < 3e-3, "{part} {expected}");
+        }
+    }
+    assert!(dark > 50, "{dark}");
+}
+
+#[test]
 fn denoising_leaves_the_noisy_colour() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 6..=6);

@@ -27,6 +27,8 @@ pub struct DataSample {
     pub particle: Option<u32>,
     /// Motion on the film to the next frame, pixels; x to the right, y up.
     pub motion: [f32; 2],
+    /// Motion on the film back to the previous frame, pixels; x to the right, y up.
+    pub motion_back: [f32; 2],
 }
 
 impl DataSample {
@@ -40,6 +42,7 @@ impl DataSample {
         id: NO_ID,
         particle: None,
         motion: [0.0; 2],
+        motion_back: [0.0; 2],
     };
 
     /// Replaces the sample by the result of `other`, at distance `z` along the view axis, if that is nearer.

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{
     aov::{DataSample, NO_ID},
-    context::RenderContext,
+    context::{OtherCamera, RenderContext},
     cryptomatte::{self, ObjectName},
     film::FilmTile,
     layers::MatteKind,
@@ -232,14 +232,25 @@ impl RenderContext<'_> {
         body.map_or(hits.particle[lane], |body| body.particle_at(&hits.get(lane)))
     }
 
-    /// Motion on the film of a point with this `velocity`, from this frame to the next, pixels; zero if it is or gets
-    /// behind the camera.
-    pub(super) fn motion(&self, point: Vec3, velocity: Vec3) -> [f32; 2] {
-        let Some((next, time)) = &self.cameras.next else {
+    /// Motion on the film of a point with this `velocity`, from this frame to the next and to the previous one, pixels;
+    /// zero if it is or gets behind the camera, and without a channel.
+    pub(super) fn motions(&self, point: Vec3, velocity: Vec3) -> [[f32; 2]; 2] {
+        let channels = &self.settings.channels;
+        let of = |plane, frame| {
+            if channels.has(plane) { self.motion(frame, point, velocity) } else { [0.0; 2] }
+        };
+        [
+            of(FilmPlane::Motion, &self.cameras.next),
+            of(FilmPlane::MotionBack, &self.cameras.previous),
+        ]
+    }
+
+    fn motion(&self, frame: &Option<OtherCamera>, point: Vec3, velocity: Vec3) -> [f32; 2] {
+        let Some((camera, time)) = frame else {
             return [0.0; 2];
         };
         let (from, to) =
-            (self.cameras.now.pixel_of(point), next.pixel_of(point + *time * velocity));
+            (self.cameras.now.pixel_of(point), camera.pixel_of(point + *time * velocity));
         match (from, to) {
             (Some(from), Some(to)) => [to[0] - from[0], from[1] - to[1]],
             _ => [0.0; 2],
@@ -269,8 +280,7 @@ impl RenderContext<'_> {
         };
         let point = lane3(&hits.point, lane);
         let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));
-        let motion =
-            if channels.has(FilmPlane::Motion) { self.motion(point, velocity) } else { [0.0; 2] };
+        let [motion, motion_back] = self.motions(point, velocity);
         DataSample {
             z,
             normal: if direction.dot(normal) < 0.0 { normal } else { -normal },
@@ -280,6 +290,7 @@ impl RenderContext<'_> {
             id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
             particle,
             motion,
+            motion_back,
         }
     }
 }

@@ -42,7 +42,7 @@ pub struct UnknownChannel {
 
 impl NamedChannel {
     /// All names, in the order of the manual.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 27] = [
         Self::Rgba,
         Self::Plane(FilmPlane::Depth),
         Self::Plane(FilmPlane::Normal),
@@ -57,10 +57,14 @@ impl NamedChannel {
         Self::Plane(FilmPlane::Refraction),
         Self::Plane(FilmPlane::Emission),
         Self::Plane(FilmPlane::Background),
+        Self::Plane(FilmPlane::Direct),
+        Self::Plane(FilmPlane::Indirect),
         Self::Plane(FilmPlane::LightGroups),
         Self::Plane(FilmPlane::Noisy),
         Self::Plane(FilmPlane::Shadow),
+        Self::Plane(FilmPlane::ShadowCatcher),
         Self::Plane(FilmPlane::Motion),
+        Self::Plane(FilmPlane::MotionBack),
         Self::Cryptomatte,
         Self::Plane(FilmPlane::CryptoParticle),
         Self::Plane(FilmPlane::CryptoMaterial),
@@ -68,9 +72,12 @@ impl NamedChannel {
         Self::Plane(FilmPlane::Overlay),
     ];
 
-    /// The channel with this name in a manifest.
+    /// The channel with this name in a manifest. Renderers with passes of transmission mean refraction.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|channel| channel.name() == name)
+        match name {
+            "transmission" => Some(Self::Plane(FilmPlane::Refraction)),
+            _ => Self::ALL.into_iter().find(|channel| channel.name() == name),
+        }
     }
 
     /// The name in a manifest.

@@ -18,7 +18,7 @@ use super::{
     source::ShadeSource,
     stream::SegmentPacket,
 };
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, OtherFrame, Scene};
 use spherule_surface::{Shape, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::Supported;
@@ -59,12 +59,16 @@ pub(super) struct RenderContext<'a> {
     pub(super) max_segments: usize,
 }
 
+/// The camera of another frame, and the time from this frame to it.
+pub(super) type OtherCamera = (CameraLanes, f32);
+
 /// The cameras of a picture.
 pub(super) struct Cameras {
     /// The camera of the frame.
     pub(super) now: CameraLanes,
-    /// That of the next frame, and the time until then.
-    pub(super) next: Option<(CameraLanes, f32)>,
+    /// Those of the next and of the previous frame.
+    pub(super) next: Option<OtherCamera>,
+    pub(super) previous: Option<OtherCamera>,
     /// The camera when the shutter opens and when it closes, with motion blur.
     pub(super) exposure: Option<[CameraLanes; 2]>,
 }
@@ -72,9 +76,11 @@ pub(super) struct Cameras {
 impl Cameras {
     fn new(scene: &Scene, [width, height]: [u32; 2]) -> Self {
         let lanes = |camera: &Camera| CameraLanes::new(camera, width, height);
+        let other = |frame: &OtherFrame| (lanes(&frame.camera), frame.time);
         Self {
             now: lanes(&scene.camera),
-            next: scene.next_frame.as_ref().map(|next| (lanes(&next.camera), next.time)),
+            next: scene.next_frame.as_ref().map(other),
+            previous: scene.previous_frame.as_ref().map(other),
             exposure: scene.exposure.as_ref().map(|e| e.cameras.each_ref().map(lanes)),
         }
     }

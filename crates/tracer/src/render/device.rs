@@ -109,6 +109,7 @@ impl RenderContext<'_> {
         let needs_particle = channels.needs_nearest_particle();
         let particle = hit.particle.filter(|_| needs_particle);
         let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));
+        let [motion, motion_back] = self.motions(hit.point, velocity);
         let albedo = || match (hit.particle, &self.scene.ground) {
             (Some(particle), _) => self.source.color(particle),
             (None, Some(ground)) => ground.color_at(hit.point),
@@ -122,11 +123,8 @@ impl RenderContext<'_> {
             albedo: if channels.has(FilmPlane::Albedo) { albedo() } else { Vec3::ZERO },
             id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
             particle,
-            motion: if channels.has(FilmPlane::Motion) {
-                self.motion(hit.point, velocity)
-            } else {
-                [0.0; 2]
-            },
+            motion,
+            motion_back,
         }
     }
 }

@@ -233,6 +233,7 @@ impl FilmTile<'_> {
         self.set(FilmPlane::Albedo, at, &data.albedo);
         self.set(FilmPlane::Id, at, &data.id);
         self.set(FilmPlane::Motion, at, &data.motion);
+        self.set(FilmPlane::MotionBack, at, &data.motion_back);
     }
 
     /// Stores the components of a pixel, all in one value, if the plane exists.

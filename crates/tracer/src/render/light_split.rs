@@ -10,7 +10,7 @@ use super::dimensions::{BOUNCED, REFLECTED, REFRACTED};
 use super::layers::LightClass;
 use super::planes::FilmPlane;
 use crate::scene::environment::LUMINANCE;
-use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
+use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, set_lane3, splat};
 
 /// The light of a packet of camera rays. Inactive for all other rays, and if the film has no channels for it.
 #[derive(Default)]
@@ -27,6 +27,12 @@ pub(super) struct LightSplit {
     pub(super) diffuse: Lanes3,
     /// Luminance of direct light: if nothing is in the way, and what arrives.
     pub(super) direct: [Lanes; 2],
+    /// Light of a camera ray and of the rays of the second depth after one interaction at most.
+    pub(super) straight: Lanes3,
+    /// Whether the rays are those of the second depth, and light is divided into classes.
+    is_second: bool,
+    /// The light that a shadow catcher lacks, if that is measured.
+    pub(super) caught: Option<Lanes3>,
 }
 
 impl LightSplit {
@@ -34,6 +40,10 @@ impl LightSplit {
     pub(super) fn start(&mut self, channels: &Channels, depth: u32) {
         self.is_active = depth == 1 && channels.needs_light_classes();
         self.has_shadow = depth == 1 && channels.has(FilmPlane::Shadow);
+        self.is_second = depth == 2 && channels.needs_light_classes();
+        self.straight = [splat(0.0); 3];
+        let is_caught = depth == 1 && channels.has(FilmPlane::ShadowCatcher);
+        self.caught = is_caught.then_some([splat(0.0); 3]);
         if self.is_active {
             self.lights = [[splat(0.0); 3]; LightClass::COUNT];
             self.sum = [splat(0.0); 3];
@@ -46,6 +56,10 @@ impl LightSplit {
 
     /// Counts what was added to `radiance` since the last call as light of `class`.
     pub(super) fn take(&mut self, class: LightClass, radiance: &Lanes3) {
+        if self.is_second && class == LightClass::Background {
+            // Rays of the second depth that leave the scene have one interaction behind them
+            self.straight = *radiance;
+        }
         if !self.is_active {
             return;
         }
@@ -56,6 +70,21 @@ impl LightSplit {
             }
         }
         self.sum = *radiance;
+    }
+
+    /// Counts what a camera ray has found as light after one interaction at most, without that of photons.
+    pub(super) fn keep_straight(&mut self, radiance: &Lanes3) {
+        for (straight, radiance) in self.straight.iter_mut().zip(radiance) {
+            for (straight, radiance) in straight.iter_mut().zip(radiance) {
+                *straight += radiance;
+            }
+        }
+    }
+
+    /// Counts `light`, which photons have brought to what a camera ray meets, as light after several interactions.
+    pub(super) fn take_focused(&mut self, lane: usize, light: Vec3) {
+        let straight = lane3(&self.straight, lane) - light;
+        set_lane3(&mut self.straight, lane, straight);
     }
 
     /// Divides what was added to `radiance` since the last call between diffuse and specular light, by

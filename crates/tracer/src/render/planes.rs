@@ -61,14 +61,23 @@ planes! {
     Emission       = "emission",        RGB,         Light,    SampleLight,       Unused;
     /// [`LightClass::Background`](super::layers::LightClass::Background).
     Background     = "background",      RGB,         Light,    SampleLight,       Unused;
+    /// Light after at most one interaction: what the camera sees of lights and of the background, and what the first
+    /// surface reflects or refracts of it.
+    Direct         = "direct",          RGB,         Light,    SampleLight,       Unused;
+    /// Light after several interactions.
+    Indirect       = "indirect",        RGB,         Light,    SampleLight,       Unused;
     /// The colour before denoising, linear.
     Noisy          = "noisy",           RGB,         Light,    Samples,           Unused;
     /// Light by its source, linear; the sum of all groups is the colour before denoising.
     LightGroups    = "light_groups",    LightGroups, Light,    Samples,           Unused;
     /// The fraction of direct light that arrives, 0 to 1.
     Shadow         = "shadow",          One,         Surface,  Samples,           Unused;
+    /// The fraction of its light that arrives on a shadow catcher, 1 elsewhere.
+    ShadowCatcher  = "shadow_catcher",  RGB,         Light,    Samples,           Unused;
     /// Motion on the film to the next frame, pixels; x to the right, y up.
     Motion         = "motion",          UV,          Surface,  NearestVelocity,   Unused;
+    /// Motion on the film back to the previous frame, pixels; x to the right, y up.
+    MotionBack     = "motion_back",     UV,          Surface,  NearestVelocity,   Unused;
     /// Attributes of the particle.
     Attributes     = "",                Attributes,  Particle, NearestAttributes, Unused;
     /// Cryptomatte: every particle is an object.

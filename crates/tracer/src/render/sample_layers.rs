@@ -29,6 +29,10 @@ pub(super) struct SampleLayers {
     groups: Vec<Lanes3>,
     /// The diffuse part of the reflection at the first surface.
     diffuse: Vec<Lanes3>,
+    /// Radiance after one interaction at most.
+    straight: Vec<Lanes3>,
+    /// The light that a shadow catcher lacks.
+    caught: Vec<Lanes3>,
     /// Luminance of direct light: if nothing is in the way, and what arrives.
     direct: Vec<[Lanes; 2]>,
     /// Objects and coverage of the samples of a pixel.
@@ -46,6 +50,8 @@ impl SampleLayers {
         self.lights.clear();
         self.groups.clear();
         self.diffuse.clear();
+        self.straight.clear();
+        self.caught.clear();
         self.direct.clear();
     }
 
@@ -57,6 +63,10 @@ impl SampleLayers {
         if self.channels.needs_light_classes() {
             self.lights.push([[splat(0.0); 3]; LightClass::COUNT]);
             self.diffuse.push([splat(0.0); 3]);
+            self.straight.push([splat(0.0); 3]);
+        }
+        if self.channels.has(FilmPlane::ShadowCatcher) {
+            self.caught.push([splat(0.0); 3]);
         }
         let groups = self.groups.len() + usize::from(self.layers.light_groups);
         self.groups.resize(groups, [splat(0.0); 3]);
@@ -69,12 +79,14 @@ impl SampleLayers {
     pub(super) fn bytes(channels: &Channels, samples: usize) -> usize {
         let objects = channels.mattes().count() * size_of::<[u32; LANES]>();
         let lights = if channels.needs_light_classes() {
-            (LightClass::COUNT + 1) * size_of::<Lanes3>()
+            (LightClass::COUNT + 2) * size_of::<Lanes3>()
         } else {
             0
         };
         let groups = usize::from(channels.layers.light_groups) * size_of::<Lanes3>();
-        let direct = if channels.has(FilmPlane::Shadow) { size_of::<[Lanes; 2]>() } else { 0 };
+        let of = |plane, bytes| if channels.has(plane) { bytes } else { 0 };
+        let direct = of(FilmPlane::Shadow, size_of::<[Lanes; 2]>())
+            + of(FilmPlane::ShadowCatcher, size_of::<Lanes3>());
         // Vectors grow by doubling
         2 * samples.div_ceil(LANES) * (objects + lights + groups + direct)
     }
@@ -86,6 +98,10 @@ impl SampleLayers {
         if split.is_active {
             self.lights[number] = split.lights;
             self.diffuse[number] = split.diffuse;
+            self.straight[number] = split.straight;
+        }
+        if let Some(caught) = split.caught {
+            self.caught[number] = caught;
         }
         if split.has_shadow {
             self.direct[number] = split.direct;
@@ -93,7 +109,8 @@ impl SampleLayers {
     }
 
     /// Adds the radiance along the rays of `segments`, which are not camera rays, to the classes of their samples.
-    pub(super) fn add(&mut self, segments: &SegmentPacket, radiance: &Lanes3) {
+    /// `straight` is the part of it after one interaction.
+    pub(super) fn add(&mut self, segments: &SegmentPacket, radiance: &Lanes3, straight: &Lanes3) {
         if !self.channels.needs_light_classes() {
             return;
         }
@@ -103,6 +120,7 @@ impl SampleLayers {
             let lights = &mut self.lights[packet];
             for axis in 0..3 {
                 let added = radiance[axis][lane];
+                self.straight[packet][axis][to] += straight[axis][lane];
                 if let Some(class) = segments.first[lane].class() {
                     lights[class as usize][axis][to] += added;
                     continue;
@@ -157,6 +175,17 @@ impl SampleLayers {
         let limited = Vec3::from_slice(&color) - Vec3::from_slice(&mean);
         if self.channels.needs_light_classes() {
             self.accumulate_classes(range.clone(), limited, (tile, [column, row]));
+            let direct = mean_of(&self.straight, range.clone()) + limited;
+            let indirect = Vec3::from_slice(&color) - direct;
+            store(tile.components_mut(FilmPlane::Direct, column, row), direct);
+            store(tile.components_mut(FilmPlane::Indirect, column, row), indirect);
+        }
+        if self.channels.has(FilmPlane::ShadowCatcher) {
+            let arriving = Vec3::ONE - mean_of(&self.caught, range.clone());
+            store(
+                tile.components_mut(FilmPlane::ShadowCatcher, column, row),
+                arriving.max(Vec3::ZERO),
+            );
         }
         let groups = tile.components_mut(FilmPlane::LightGroups, column, row);
         self.accumulate_groups(range.clone(), limited, groups);
@@ -217,5 +246,18 @@ impl SampleLayers {
             let mean = samples.sum::<Vec3>() * share + limited;
             light.copy_from_slice(&mean.to_array());
         }
+    }
+}
+
+/// The mean of the samples in `range`.
+fn mean_of(samples: &[Lanes3], range: Range<usize>) -> Vec3 {
+    let share = 1.0 / range.len() as f32;
+    range.map(|s| lane3(&samples[s / LANES], s % LANES)).sum::<Vec3>() * share
+}
+
+/// Stores `color` in the components of a pixel, if it has them.
+fn store(components: &mut [f32], color: Vec3) {
+    for (component, value) in components.iter_mut().zip(color.to_array()) {
+        *component = value;
     }
 }

@@ -116,7 +116,9 @@ pub struct Scene {
     /// Index of the light group of the environment; 0 is that of light without a group.
     pub environment_group: u8,
     /// The next frame, for motion on the film.
-    pub next_frame: Option<NextFrame>,
+    pub next_frame: Option<OtherFrame>,
+    /// The previous frame, for motion on the film.
+    pub previous_frame: Option<OtherFrame>,
     /// What changes while the shutter is open, with motion blur.
     pub exposure: Option<Exposure>,
 }
@@ -130,12 +132,12 @@ pub struct Exposure {
     pub slices: u32,
 }
 
-/// Where things are in the next frame.
+/// Where things are in the next or in the previous frame.
 #[derive(Debug, Clone, Copy)]
-pub struct NextFrame {
+pub struct OtherFrame {
     /// Its camera.
     pub camera: Camera,
-    /// Time until then, in the unit of the velocities.
+    /// Time from this frame to it, in the unit of the velocities; negative if it is earlier.
     pub time: f32,
 }
 
@@ -156,6 +158,7 @@ impl Scene {
             is_environment_visible: false,
             environment_group: 0,
             next_frame: None,
+            previous_frame: None,
             exposure: None,
         }
     }

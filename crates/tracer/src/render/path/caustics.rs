@@ -115,6 +115,9 @@ impl PathIntegrator<'_> {
                 let value = lane3(&packet.bsdf.value, lane) / cosine.max(MIN_COSINE);
                 let light = lane3(&packet.weight, lane) * value * irradiance;
                 add_to(&mut packet.radiance, lane, light);
+                if packet.split.is_active {
+                    packet.split.take_focused(lane, light);
+                }
                 packet.groups.add_lane(group, lane, light);
                 sums[lane] += irradiance.max_element() * to_light;
             }
