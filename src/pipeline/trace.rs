@@ -211,7 +211,7 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
 fn sampling(film: &Film, setup: &Setup, rays: &RayCounts) -> Option<SamplingSummary> {
     let pixels = film.color.len() as f64;
     let part = |of: u64| if pixels > 0.0 { of as f64 / pixels } else { 0.0 };
-    let summary = SamplingSummary { samples: part(rays.kept), noisy: part(rays.noisy_pixels) };
+    let summary = SamplingSummary { samples: part(rays.samples), noisy: part(rays.noisy_pixels) };
     setup.picture.render.noise.map(|_| summary)
 }
 

@@ -336,7 +336,7 @@ pub const fn ray_counts(cost: &Cost) -> RayCounts {
         reflection: cost.reflected_rays,
         refraction: 0,
         lost: LostLight::NONE,
-        kept: 0,
+        samples: 0,
         noisy_pixels: 0,
     }
 }

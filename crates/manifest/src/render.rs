@@ -270,8 +270,8 @@ section! {
         /// Limit of noise: tiles of 16x16 pixels take more samples until their noise is below it, or off
         ///
         /// The noise is measured before denoising, and relative to white: 0.02 is hardly seen, 0.1 suits pictures that are
-        /// denoised. A tile takes at least image.samples and at most image.max_samples, and equals that of an image with its
-        /// number. It is an estimate, which rare bright samples escape.
+        /// denoised. A tile takes at least image.samples and at most image.max_samples. It is an estimate, which rare
+        /// bright samples escape.
         noise: Option<f32> = None, or("off"), above(0), to(MAX_NOISE), unit("a part of white"), flag("noise", "LIMIT", "Look");
         /// Sequence of the random numbers
         ///

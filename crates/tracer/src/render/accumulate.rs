@@ -4,7 +4,10 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::{film::FilmTile, scratch::SampleGroup};
+use super::{
+    film::{FilmTile, bounded},
+    scratch::SampleGroup,
+};
 use spherule_tree::math::{LANES, Lanes, Lanes3, fold, lane3};
 
 impl SampleGroup {
@@ -47,11 +50,6 @@ impl SampleGroup {
         let coverage = odd.map(covered).sum::<f32>() / share;
         mean.extend(coverage).to_array()
     }
-}
-
-/// The colour of a pixel, not negative and with a coverage of 0 to 1 if `is_bounded`.
-pub(super) fn bounded([r, g, b, a]: [f32; 4], is_bounded: bool) -> [f32; 4] {
-    if is_bounded { [r.max(0.0), g.max(0.0), b.max(0.0), a.clamp(0.0, 1.0)] } else { [r, g, b, a] }
 }
 
 /// The sum of the samples in `range`: packet by packet if a pixel has whole packets, otherwise one by one. In both

@@ -1,9 +1,8 @@
 //! Adaptive sampling: tiles with more noise than a limit take more samples.
 //!
-//! A tile is rendered with few samples. If its noise is above the limit, it is rendered again with as many as the limit
-//! is expected to need, at least a third more and at most eight times as many, until it is below. What was rendered before
-//! is not used, so each tile equals that of a picture in which all pixels have its number of samples, with all its planes.
-//! The passes before the last one usually cost a third to a half of it.
+//! A tile is rendered with few samples. If its noise is above the limit, another pass over it takes as many more as the
+//! limit is expected to need, with other random numbers, until all passes together are below. Planes of the nearest sample
+//! of a pixel are those of the first pass.
 
 use super::film::FilmTile;
 use super::integrator::Integrator;
@@ -13,12 +12,12 @@ use super::scratch::Scratch;
 use super::settings::NoiseLimit;
 use super::stop::Stop;
 
-/// Each pass has at most this many times the samples of the one before, because one bright sample raises the expected
+/// A pass makes at most this many times as many samples of those before, because one bright sample raises the expected
 /// number far too high.
 const MAX_GROWTH: f64 = 8.0;
 
-/// How many more samples are taken than are expected to be needed, so that few passes are in vain.
-const MARGIN: f64 = 1.1;
+/// How many more samples are taken than are expected to be needed, so that there are few passes.
+const MARGIN: f64 = 1.05;
 
 /// The integrators of the passes, with more and more samples, and the limit of the noise.
 pub(super) struct Passes<'a> {
@@ -37,41 +36,79 @@ impl Passes<'_> {
         let Some(limit) = self.limit else {
             return self.integrators[0].render_tile(tile, stop, scratch);
         };
-        let pixels = u64::from(tile.width * tile.rows);
-        let first = self.samples(0);
-        let (mut pass, mut before) = (0, RayCounts::default());
-        loop {
+        let mut joined: Option<Joined> = None;
+        let (mut counts, mut number) = (RayCounts::default(), Some(0));
+        scratch.group.pass = 0;
+        while let Some(pass) = number {
             // Render the tile, and measure its noise
             scratch.group.noise = Some(TileNoise::default());
-            let mut counts = self.integrators[pass].render_tile(tile, stop, scratch)?;
+            counts = counts + self.integrators[pass].render_tile(tile, stop, scratch)?;
             let noise = scratch.group.noise.take().unwrap_or_default().mean();
-            let is_last = pass + 1 == self.integrators.len();
-            let is_below = noise <= f64::from(limit.noise);
-            if is_below || is_last {
-                // Light that earlier passes have lost is not missing in the picture
-                counts.lost = counts.lost.of_samples(self.samples(pass), first);
-                counts.kept = pixels * u64::from(self.samples(pass));
-                counts.noisy_pixels = if is_below { 0 } else { pixels };
-                return Some(before + counts);
-            }
-            before = before + counts.without_lost();
-            pass = self.next(pass, noise / f64::from(limit.noise));
+            let this = Joined { samples: self.samples(pass), noise };
+            scratch.group.pass += 1;
+            // Join it with the passes before
+            let all = match (joined, scratch.earlier.take()) {
+                (Some(before), Some(earlier)) => {
+                    tile.join(&earlier, before.share(this));
+                    before.with(this)
+                }
+                _ => this,
+            };
+            joined = Some(all);
+            number = self.next(all, limit);
+            scratch.earlier = number.map(|_| tile.pass());
         }
+        if self.integrators[0].context().catches_shadows() {
+            tile.bound();
+        }
+        let all = joined?;
+        let pixels = u64::from(tile.width * tile.rows);
+        counts.lost = counts.lost.of_samples(all.samples, self.samples(0));
+        counts.samples = pixels * u64::from(all.samples);
+        counts.noisy_pixels = if all.noise <= f64::from(limit.noise) { 0 } else { pixels };
+        Some(counts)
     }
 
-    /// Samples per pixel.
+    /// Samples per pixel of a pass.
     fn samples(&self, pass: usize) -> u32 {
         self.integrators[pass].context().settings.samples
     }
 
-    /// The pass after `pass`, whose noise was `excess` times the limit: noise falls with the root of the number of
-    /// samples.
-    fn next(&self, pass: usize, excess: f64) -> usize {
-        let samples = self.samples(pass);
+    /// The next pass over a tile with `all` passes so far, if its noise is above the limit and it may have more samples.
+    fn next(&self, all: Joined, limit: NoiseLimit) -> Option<usize> {
+        let excess = all.noise / f64::from(limit.noise);
+        if excess <= 1.0 {
+            return None;
+        }
+        // Noise falls with the root of the number of samples
         let growth = (MARGIN * excess * excess).min(MAX_GROWTH);
-        let needed = f64::from(samples) * growth;
-        let is_enough = |other: &usize| f64::from(self.samples(*other)) >= needed;
-        let last = self.integrators.len() - 1;
-        (pass + 1..last).find(is_enough).unwrap_or(last)
+        let needed = f64::from(all.samples) * (growth - 1.0);
+        let most = self.samples(self.integrators.len() - 1).saturating_sub(all.samples);
+        let possible = (0..self.integrators.len()).take_while(|pass| self.samples(*pass) <= most);
+        let is_enough = |pass: &usize| f64::from(self.samples(*pass)) >= needed;
+        possible.clone().find(is_enough).or(possible.last())
+    }
+}
+
+/// Passes over a tile.
+#[derive(Clone, Copy)]
+struct Joined {
+    /// Samples per pixel.
+    samples: u32,
+    /// Noise of the tile.
+    noise: f64,
+}
+
+impl Joined {
+    /// The share of these passes in the samples of them and `other`.
+    fn share(self, other: Self) -> f32 {
+        self.samples as f32 / (self.samples + other.samples) as f32
+    }
+
+    /// These and `other`, whose noise is independent.
+    fn with(self, other: Self) -> Self {
+        let samples = self.samples + other.samples;
+        let squares = [self, other].map(|of| (of.noise * f64::from(of.samples)).powi(2));
+        Self { samples, noise: squares.iter().sum::<f64>().sqrt() / f64::from(samples) }
     }
 }

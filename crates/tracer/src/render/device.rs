@@ -13,11 +13,10 @@ pub use super::path::ambient::reach as ambient_reach;
 pub use super::path::catcher::{light_on, mirrors_see_through, reflected_by_white};
 
 use super::{
-    accumulate::bounded,
     aov::{DataSample, NO_ID},
     channels::Channels,
     context::RenderContext,
-    film::{Film, FilmTile},
+    film::{Film, FilmTile, bounded},
     planes::FilmPlane,
     settings::{RenderError, RenderSettings},
     source::ShadeSource,

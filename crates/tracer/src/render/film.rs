@@ -162,7 +162,7 @@ impl Band<'_> {
 }
 
 /// The rows of one plane in a tile.
-type Rows<'a, T> = Vec<&'a mut [T]>;
+pub(super) type Rows<'a, T> = Vec<&'a mut [T]>;
 
 /// The rows of each tile of `columns` values, from a band of a plane with `width` values in a row; none without values.
 fn rows_of_tiles<T>(band: &mut [T], width: usize, columns: usize) -> Vec<Rows<'_, T>> {
@@ -189,11 +189,11 @@ pub(super) struct FilmTile<'a> {
     pub(super) width: u32,
     /// Height in pixels.
     pub(super) rows: u32,
-    color: Rows<'a, [f32; 4]>,
-    planes: PerPlane<Rows<'a, u32>>,
+    pub(super) color: Rows<'a, [f32; 4]>,
+    pub(super) planes: PerPlane<Rows<'a, u32>>,
     /// Number of components of a pixel in each plane.
-    sizes: PerPlane<usize>,
-    odd: Option<Rows<'a, [f32; 4]>>,
+    pub(super) sizes: PerPlane<usize>,
+    pub(super) odd: Option<Rows<'a, [f32; 4]>>,
 }
 
 impl FilmTile<'_> {
@@ -244,6 +244,11 @@ impl FilmTile<'_> {
             row[column * words.len()..][..words.len()].copy_from_slice(words);
         }
     }
+}
+
+/// The colour of a pixel, not negative and with a coverage of 0 to 1 if `is_bounded`.
+pub(super) fn bounded([r, g, b, a]: [f32; 4], is_bounded: bool) -> [f32; 4] {
+    if is_bounded { [r.max(0.0), g.max(0.0), b.max(0.0), a.clamp(0.0, 1.0)] } else { [r, g, b, a] }
 }
 
 #[cfg(test)]

@@ -46,11 +46,13 @@ impl RenderContext<'_> {
                     (true, false) => -1.0,
                     (true, true) => 1.0,
                 },
-                path: PathSeed::of_pixel(column_number, row_number).in_sequence(self.settings.seed),
+                path: PathSeed::of_pixel(column_number, row_number)
+                    .in_sequence(self.settings.seed)
+                    .in_pass(group.pass),
                 data: DataSample::MISS,
             });
             // Add the samples of the pixel, relative to the image of its eye
-            let points = self.sampler.points(column_number, row_number);
+            let points = self.sampler.points_of_pass(column_number, row_number, group.pass);
             let [x, y] = if is_right { [x % eye_size[0], y % eye_size[1]] } else { [x, y] };
             group.push_pixel(x as f32, y as f32, points);
         }

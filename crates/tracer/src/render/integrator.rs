@@ -75,7 +75,8 @@ pub(super) trait Integrator: Sync {
             let group = pixels.by_ref().take(group_len);
             context.place_samples(tile, group, &mut scratch.group);
             trace_group(self, stop, scratch)?;
-            let is_bounded = context.catches_shadows();
+            // Passes are bounded when they are joined
+            let is_bounded = context.catches_shadows() && scratch.group.noise.is_none();
             scratch.group.accumulate(samples, is_bounded, tile);
             context.store_attributes(&scratch.group.pixels, tile);
         }

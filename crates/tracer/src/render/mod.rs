@@ -31,6 +31,7 @@ mod dimensions;
 mod drawing;
 mod entries;
 mod film;
+mod film_join;
 mod film_rows;
 mod generate;
 mod integrator;
@@ -144,6 +145,7 @@ use context::RenderContext;
 use integrator::Integrator;
 use path::PathIntegrator;
 use scene_shapes::Interior;
+use tile::SIDE;
 use whitted::WhittedIntegrator;
 
 /// The available renderers. Images depend on the renderer.
@@ -177,7 +179,12 @@ pub fn scratch_bytes(
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
     let most = settings.last_pass().samples;
-    scratch::scratch_bytes(most, max_depth, max_paths, &settings.channels)
+    // Passes are joined tile by tile
+    let pass = match settings.noise {
+        None => 0,
+        Some(_) => Film::bytes_for(SIDE, SIDE, settings.channels, settings.has_features),
+    };
+    pass + scratch::scratch_bytes(most, max_depth, max_paths, &settings.channels)
         + stream::bytes_of_slices(slices)
 }
 
@@ -255,10 +262,10 @@ pub fn render_into(
     };
     // Render bands and their tiles in parallel, so that a slow corner of the image keeps all threads busy
     let counts = film
-        .bands_mut(tile::SIDE)
+        .bands_mut(SIDE)
         .into_par_iter()
         .map(|mut band| {
-            let tiles = band.tiles(tile::SIDE).into_par_iter();
+            let tiles = band.tiles(SIDE).into_par_iter();
             tiles
                 .map(|mut tile| render_tile(&mut tile))
                 .try_reduce(RayCounts::default, |a, b| Ok(a + b))

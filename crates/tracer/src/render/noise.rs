@@ -25,6 +25,7 @@ impl TileNoise {
         self.pixels += 1;
     }
 
+    /// The noise of the tile.
     pub(super) fn mean(self) -> f64 {
         (self.squares / f64::from(self.pixels.max(1))).sqrt()
     }

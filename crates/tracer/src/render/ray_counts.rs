@@ -54,8 +54,8 @@ pub struct RayCounts {
     pub refraction: u64,
     /// Light that the clamp of indirect light took away.
     pub lost: LostLight,
-    /// Adaptive sampling: camera rays whose samples are in the picture. The others found out how many are needed.
-    pub kept: u64,
+    /// Adaptive sampling: samples of all pixels.
+    pub samples: u64,
     /// Adaptive sampling: pixels of tiles that have the most samples and are still above the limit of noise.
     pub noisy_pixels: u64,
 }
@@ -64,11 +64,6 @@ impl RayCounts {
     /// Number of all rays.
     pub const fn total(&self) -> u64 {
         self.primary + self.shadow + self.reflection + self.refraction
-    }
-
-    /// The same rays, without lost light.
-    pub(super) const fn without_lost(self) -> Self {
-        Self { lost: LostLight::NONE, ..self }
     }
 }
 
@@ -82,7 +77,7 @@ impl std::ops::Add for RayCounts {
             reflection: self.reflection + other.reflection,
             refraction: self.refraction + other.refraction,
             lost: self.lost.plus(other.lost),
-            kept: self.kept + other.kept,
+            samples: self.samples + other.samples,
             noisy_pixels: self.noisy_pixels + other.noisy_pixels,
         }
     }

@@ -8,6 +8,7 @@ use super::{
     channels::Channels,
     clamp::IndirectClamp,
     entries::Entries,
+    film_join::TilePass,
     interface::LeavingRays,
     layers::LightClass,
     light_groups::GroupLight,
@@ -41,6 +42,8 @@ pub(super) struct Scratch {
     /// The next depth.
     pub(super) next: RayStreams,
     pub(super) packet: Box<PacketScratch>,
+    /// The passes of a tile before this one.
+    pub(super) earlier: Option<TilePass>,
 }
 
 /// The samples of a group of pixels, pixel by pixel.
@@ -57,6 +60,8 @@ pub(super) struct SampleGroup {
     pub(super) coverage: Vec<Lanes>,
     /// Contributions to the layers of the film.
     pub(super) layers: SampleLayers,
+    /// Passes of the tile before this one, with other random numbers.
+    pub(super) pass: u32,
     /// The noise of the tile, if it is measured.
     pub(super) noise: Option<TileNoise>,
 }

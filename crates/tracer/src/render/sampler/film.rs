@@ -50,7 +50,12 @@ impl FilmSampler {
     /// The points of pixel `(x, y)`, with coordinates in 0..1, or around that with a filter that is wider than the
     /// pixel. A single point is the centre of the pixel.
     pub fn points(&self, x: u32, y: u32) -> (&[f32], &[f32]) {
-        let set = self.set_of(x, y) as usize;
+        self.points_of_pass(x, y, 0)
+    }
+
+    /// The points of a later pass over pixel `(x, y)`; 0 is [`Self::points`].
+    pub(in crate::render) fn points_of_pass(&self, x: u32, y: u32, pass: u32) -> (&[f32], &[f32]) {
+        let set = (self.set_of(x, y) + pass) as usize % (self.x.len() / self.samples);
         let range = set * self.samples..(set + 1) * self.samples;
         (&self.x[range.clone()], &self.y[range])
     }

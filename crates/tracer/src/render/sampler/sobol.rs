@@ -24,6 +24,16 @@ impl PathSeed {
         Self(self.0 ^ Self::sequence_bits(seed))
     }
 
+    /// The same path with other random numbers, those of a later pass over the pixel; 0 is the path itself.
+    #[must_use]
+    pub(in crate::render) const fn in_pass(self, pass: u32) -> Self {
+        match pass {
+            0 => self,
+            // Seeds of sequences are below
+            _ => self.in_sequence(u32::MAX - pass),
+        }
+    }
+
     /// The bits by which [`Self::in_sequence`] changes seeds, on all devices: 0 for sequence 0, otherwise a hash.
     pub const fn sequence_bits(seed: u32) -> u64 {
         match seed {
