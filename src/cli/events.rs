@@ -29,6 +29,11 @@ pub(super) fn start() {
     *stream() = Some(Stream { summary: Map::new(), is_closed: false });
 }
 
+/// Whether events are sent.
+pub(super) fn are_sent() -> bool {
+    stream().is_some()
+}
+
 /// Sends one event.
 pub(super) fn send(event: &str, facts: Value) {
     if let Some(stream) = &mut *stream() {

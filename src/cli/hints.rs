@@ -6,9 +6,6 @@ use clap::{Command, Error};
 use super::guesses::hints_for;
 use crate::manifest::{keys_called, nearest};
 
-/// Options of other programs for more messages.
-const VERBOSE: [&str; 2] = ["-v", "--verbose"];
-
 /// `error` of the arguments of the command `name` of `program`, with hints that help.
 pub(super) fn with_hints(error: Error, name: &str, program: &Command) -> Error {
     let Some(command) = program.find_subcommand(name) else {
@@ -76,9 +73,6 @@ fn is_hidden(command: &Command, option: &str) -> bool {
 
 /// What `command` has instead of the option `typed`.
 fn hint(typed: &str, command: &Command) -> Option<String> {
-    if VERBOSE.contains(&typed) && has_option(command, "progress") {
-        return Some("'--progress plain' prints a line for each frame".to_owned());
-    }
     let name = typed.trim_start_matches('-');
     let hints = hints_for(name).filter(|hint| is_possible(hint, command));
     let (options, texts): (Vec<&str>, Vec<&str>) = hints.partition(|hint| hint.starts_with("--"));

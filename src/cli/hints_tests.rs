@@ -18,7 +18,6 @@ fn hints_name_what_the_command_has() {
         ("spherule still a -o b.png --filter box", "'--set image.filter=VALUE'"),
         ("spherule still a -o b.png --camera-f-stop 3", "'--set camera.f_stop=VALUE'"),
         ("spherule render a --widht 3", "'--width'"),
-        ("spherule render a -v", "'--progress plain'"),
         (
             "spherule still a -o b.png --isolate",
             "--isolate: is for jobs, and `spherule still` has none",

@@ -66,6 +66,7 @@ mod shortcuts;
 mod signals;
 mod status;
 mod still;
+mod still_progress;
 mod style_flag;
 mod verify;
 mod view;
@@ -79,6 +80,9 @@ struct Cli {
     /// Print only errors: no notes, no progress.
     #[arg(short, long, global = true)]
     quiet: bool,
+    /// Print the stages, rays and memory of each picture.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -166,6 +170,9 @@ fn parse(arguments: &[OsString]) -> Result<Command, u8> {
         Ok(cli) => {
             if cli.quiet {
                 print::silence();
+            }
+            if cli.verbose {
+                print::tell_more();
             }
             return Ok(cli.command);
         }

@@ -22,6 +22,19 @@ pub(super) enum Reader {
     Gone,
 }
 
+/// Whether the stages, rays and memory of pictures are printed.
+static IS_VERBOSE: AtomicBool = AtomicBool::new(false);
+
+/// Prints the stages, rays and memory of pictures from now on.
+pub(super) fn tell_more() {
+    IS_VERBOSE.store(true, Ordering::Relaxed);
+}
+
+/// Whether the stages, rays and memory of pictures are printed.
+pub(super) fn is_verbose() -> bool {
+    IS_VERBOSE.load(Ordering::Relaxed)
+}
+
 /// Whether only errors are printed to standard error.
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
 

@@ -88,7 +88,9 @@ impl Progress {
         events::send("start", json!({"command": command, "total": total, "output": output}));
         let display = match mode {
             ProgressMode::Auto | ProgressMode::Plain if print::is_quiet() => Display::Nothing,
-            ProgressMode::Auto if stderr().is_terminal() => Display::Bar(bar(total)),
+            ProgressMode::Auto if stderr().is_terminal() && !print::is_verbose() => {
+                Display::Bar(bar(total))
+            }
             ProgressMode::Auto | ProgressMode::Plain => Display::Plain,
             ProgressMode::Openjd => Display::Openjd,
             ProgressMode::Json | ProgressMode::None => Display::Nothing,

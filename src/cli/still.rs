@@ -6,18 +6,20 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use serde_json::json;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, Job};
 
 use super::job::{list, use_threads};
 use super::manifest_args::{ManifestArgs, complete, open_sequence};
 use super::paths::absolute;
-use super::render::{print_summary, sampling_notes};
-use super::{CliError, Outcome, disk, print, signals};
+use super::render::{details, print_summary, sampling_notes};
+use super::still_progress::StillProgress;
+use super::{CliError, Outcome, disk, events, print, signals};
 use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
-use crate::manifest::Look;
+use crate::manifest::{Look, ProgressMode};
 use crate::output::{OutputError, PictureFormat};
-use crate::pipeline::{ImageError, ImageTask, Setup, WriteError, make_image};
+use crate::pipeline::{ImageError, ImageTask, Setup, WriteError, make_image_until};
 use crate::render::Channels;
 use crate::report::FrameReport;
 
@@ -37,7 +39,6 @@ const EXAMPLES: &str = "Examples:
     after_help = EXAMPLES,
     mut_arg("output", |a| a.required(true).value_name("FILE").help(OUTPUT_HELP).long_help(OUTPUT_HELP)),
     mut_arg("frames", no_job),
-    mut_arg("progress", no_job),
     mut_arg("isolate", no_job),
     mut_arg("memory-ceiling", no_job),
     mut_arg("retries", no_job),
@@ -119,6 +120,10 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let format = format_of(&shown)?;
     let output = absolute(&shown)?;
     let mut requested = args.manifest.manifest()?;
+    let mode = requested.manifest.job.progress;
+    if mode == ProgressMode::Json {
+        events::start();
+    }
     use_threads(requested.manifest.job.threads)?;
     if format == PictureFormat::Jpeg && requested.manifest.output.transparent {
         return Err(CliError::other(OutputError::NoAlpha.to_string()));
@@ -153,7 +158,16 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     require_one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
-    let rendered = make_image(&setup, &sequence, task, |note| note!("{note}"));
+    let render = &setup.picture.render;
+    let pixels = u64::from(render.width) * u64::from(render.height);
+    events::send(
+        "start",
+        json!({"command": "still", "total": 1, "output": shown.display().to_string()}),
+    );
+    let progress = StillProgress::new(mode, pixels);
+    let show = |note| progress.above_bar(|| note!("{note}"));
+    let rendered = make_image_until(&setup, &sequence, task, &progress, show);
+    progress.finish();
     report(rendered, frame, &shown, start)
 }
 
@@ -169,17 +183,31 @@ fn report(
             for text in sampling_notes(&report) {
                 note!("{text}");
             }
-            print::lines([format!(
-                "{}: frame {frame}, {} particles, {:.2} s",
-                shown.display(),
-                report.particles,
-                start.elapsed().as_secs_f64()
-            )])?;
+            if print::is_verbose() {
+                message!("{}", details(&report));
+            }
+            let image = shown.display().to_string();
+            let facts = json!({"frame": frame, "image": image, "seconds": report.seconds, "done": 1, "total": 1});
+            events::send("frame_done", facts);
+            events::add_to_end(json!({"total": 1, "done": 1}));
+            if !events::are_sent() {
+                print::lines([format!(
+                    "{image}: frame {frame}, {} particles, {:.2} s",
+                    report.particles,
+                    start.elapsed().as_secs_f64()
+                )])?;
+            }
             Ok(Outcome::Done)
         }
         Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(shown)(source)),
         Err(error) => {
             error!("frame {frame}: {error}");
+            let reason = error.to_string();
+            events::send(
+                "frame_failed",
+                json!({"frame": frame, "reason": reason, "done": 1, "total": 1}),
+            );
+            events::add_to_end(json!({"total": 1, "done": 0, "failed": [frame]}));
             Ok(Outcome::SomeFailed)
         }
     }

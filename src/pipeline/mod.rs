@@ -78,7 +78,7 @@ pub use setup::{
     StyleForm, Things, TrailStyle, ViewSettings,
 };
 pub use shutter::{FrameStep, Shutter};
-pub use single::{make_image, trace_particles};
+pub use single::{make_image, make_image_until, trace_particles};
 pub use trace::{CpuRenderer, renderer_of};
 pub use work::RenderWork;
 

@@ -27,7 +27,21 @@ pub fn make_image(
     task: &ImageTask,
     note: impl FnMut(String),
 ) -> Result<FrameReport, ImageError> {
-    let traced = trace_single(setup, sequence, task, note)?;
+    make_image_until(setup, sequence, task, &AtomicBool::new(false), note)
+}
+
+/// Same as [`make_image`]; `stop` ends it, and hears how many pixels are traced.
+///
+/// # Errors
+/// Same as [`make_image`]; [`RenderError::Interrupted`](crate::render::RenderError::Interrupted) if `stop` is raised.
+pub fn make_image_until(
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+    stop: &dyn Stop,
+    note: impl FnMut(String),
+) -> Result<FrameReport, ImageError> {
+    let traced = trace_single(setup, sequence, task, stop, note)?;
     catch_panic(|| {
         let (report, _) = write_frame(setup, traced, &Mutex::default())?;
         Ok(report)
@@ -56,12 +70,12 @@ fn trace_single(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
+    stop: &dyn Stop,
     note: impl FnMut(String),
 ) -> Result<TracedFrame, ImageError> {
     catch_panic(|| {
         task.check()?;
-        let stop = AtomicBool::new(false);
-        trace(setup, || load_frame(setup, sequence, task), &stop, note)
+        trace(setup, || load_frame(setup, sequence, task), stop, note)
     })
 }
 

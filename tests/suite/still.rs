@@ -224,3 +224,35 @@ fn pictures_without_background_have_alpha() {
         workshop.run(command).expect(0);
     }
 }
+
+#[test]
+fn progress_and_details_are_shown_on_request() {
+    let workshop = workshop();
+    // Nothing of it without a terminal
+    let usual = still(&workshop, &["-o", "a.png"]).expect(0);
+    assert!(!usual.errors().contains("traced"), "{}", usual.errors());
+    let plain = still(&workshop, &["-o", "a.png", "--progress", "plain", "-v"]).expect(0);
+    let errors = plain.errors();
+    let tenths: Vec<&str> = errors.lines().filter(|line| line.ends_with("% traced")).collect();
+    assert_eq!((tenths.len(), tenths[0], tenths[9]), (10, "10 % traced", "100 % traced"));
+    let details = errors.lines().find(|line| line.contains("million rays")).expect("details");
+    for part in ["trace ", "encode ", "peak memory "] {
+        assert!(details.contains(part), "{details}");
+    }
+    // Events: every percent once, in rising order, and the picture
+    let events = still(&workshop, &["-o", "a.png", "--progress", "json"]).expect(0).text();
+    let events: Vec<serde_json::Value> =
+        events.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let of = |name: &str| events.iter().filter(|event| event["event"] == name).count();
+    assert_eq!([of("start"), of("progress"), of("frame_done"), of("end")], [1, 100, 1, 1]);
+    let mut percents: Vec<u64> =
+        events.iter().filter_map(|event| event["percent"].as_u64()).collect();
+    percents.sort_unstable();
+    assert_eq!(percents, (1..=100).collect::<Vec<u64>>());
+    assert_eq!(events[events.len() - 1]["done"], 1);
+    // Both words at once make no sense
+    still(&workshop, &["-o", "a.png", "-q", "-v"]).expect(2);
+    // Jobs have the details in their lines
+    let job = workshop.run(&["render", "in", "-o", "out/f.####.exr", "-v", "--size", "64x36"]);
+    assert!(job.expect(0).errors().contains("million rays; peak memory"));
+}

@@ -19,7 +19,7 @@ mod summary;
 
 use run::Run;
 pub(super) use summary::{
-    CELL_HINT, parts_text, print_summary, radius_text, sampling_notes, unframed_text,
+    CELL_HINT, details, parts_text, print_summary, radius_text, sampling_notes, unframed_text,
 };
 
 const EXAMPLES: &str = "\

@@ -2,9 +2,10 @@
 
 use glam::DVec3;
 use serde_json::{Value, json};
-use spherule_files::counted;
+use spherule_files::{Bytes, counted};
 use spherule_formats::Sequence;
 
+use crate::cli::print;
 use crate::cli::progress::ShowReport;
 use crate::job::cpu_note;
 use crate::manifest::points_on_paper;
@@ -22,9 +23,11 @@ impl ShowReport for FrameReport {
             none if none < 5e-4 => String::new(),
             seconds => format!("surface {seconds:.3} s, "),
         };
+        let more =
+            if print::is_verbose() { format!(" ({})", details(self)) } else { String::new() };
         let notes: String = sampling_notes(self).iter().map(|text| format!(", {text}")).collect();
         format!(
-            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s{notes}",
+            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s{notes}{more}",
             self.particles, self.build.structure, s.build, s.trace
         )
     }
@@ -32,6 +35,30 @@ impl ShowReport for FrameReport {
     fn facts(&self, output: String) -> Value {
         json!({"image": output, "seconds": self.seconds})
     }
+}
+
+/// All stages, rays and memory of a picture, for `--verbose`.
+pub(in crate::cli) fn details(report: &FrameReport) -> String {
+    let s = &report.seconds;
+    let stages = [
+        ("read", s.read),
+        ("build", s.build),
+        ("surface", s.surface),
+        ("trace", s.trace),
+        ("denoise", s.denoise),
+        ("encode", s.encode),
+    ];
+    let times: Vec<String> = stages
+        .iter()
+        .filter(|(_, seconds)| *seconds > 0.0)
+        .map(|(stage, seconds)| format!("{stage} {seconds:.3} s"))
+        .collect();
+    format!(
+        "{}; {:.2} million rays; peak memory {}",
+        times.join(", "),
+        report.rays.total() as f64 / 1e6,
+        Bytes(report.rss.total_peak)
+    )
 }
 
 /// How many samples a picture with a limit of noise took, and how much light it has lost to the clamp of indirect light.

@@ -258,6 +258,7 @@ pub fn render_into(
         let mut own = lock(&scratch).pop().unwrap_or_default();
         let counts = passes.render_tile(tile, stop, &mut own);
         lock(&scratch).push(own);
+        stop.pixels_done(tile.width * tile.rows);
         counts.ok_or(RenderError::Interrupted)
     };
     // Render bands and their tiles in parallel, so that a slow corner of the image keeps all threads busy

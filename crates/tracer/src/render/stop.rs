@@ -3,10 +3,13 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// A stop request. All threads check it often, so the check must be cheap; once raised, it must stay raised.
+/// A stop request, and what is told about the progress. All threads check it often, so the check must be cheap; once raised, it must stay raised.
 pub trait Stop: Sync {
     /// Whether to stop.
     fn is_raised(&self) -> bool;
+
+    /// Called when so many more pixels are traced, by any thread.
+    fn pixels_done(&self, _count: u32) {}
 }
 
 impl Stop for AtomicBool {
