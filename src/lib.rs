@@ -8,6 +8,17 @@
 //! [`output`], [`overlay`], [`picture`] and `movie` those of `spherule-images`. [`surface`], [`manifest`], [`survey`],
 //! [`selection`], [`report`] and `scale` are the crates of these names.
 //!
+//! ```text
+//! files of simulations                                                              pictures
+//!        |                                                                              ^
+//!        |  compression, readers, hdf5, formats                                         |  images, report
+//!        v                                                                              |
+//!   ParticleFrame ------> tree ------> surface ------> tracer or gpu ------> Film ------'
+//!        ^   selection, survey            (spherule: defaults, pipeline, commands)
+//!        |
+//!   manifest: every setting        jobs: which frames are done        files, frame: used by all
+//! ```
+//!
 //! This example renders positions in memory to planes, and to the bytes of an EXR and a PNG, without files:
 //!
 //! ```

@@ -3,7 +3,28 @@
 //! `decompressor` reads a file from front to back, `member` decodes one stream of it (`lz4`, `scf` with `blosc`, and
 //! `zip` for an archive of one file), `length` estimates the decompressed length, `whole` reads all of a file, and
 //! `regular` detects changes of it. NPZ files are archives of arrays and not compressed in this sense. Which format the
-//! content has is left to others.
+//! content has is left to others: `spherule-readers` and `spherule-formats` take the bytes.
+//!
+//! ```
+//! use std::io::Write;
+//!
+//! use flate2::Compression;
+//! use flate2::write::GzEncoder;
+//! use spherule_compression::{is_compressed, read_whole, strip_extension};
+//! use spherule_frame::MemoryBudget;
+//!
+//! let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+//! gzip.write_all(b"x,y,z\n0,0,1\n")?;
+//! let bytes = gzip.finish()?;
+//! assert!(is_compressed(&bytes));
+//! assert_eq!(strip_extension("drop.csv.gz"), "drop.csv");
+//!
+//! let path = std::env::temp_dir().join(format!("{}.csv.gz", std::process::id()));
+//! std::fs::write(&path, bytes)?;
+//! assert_eq!(read_whole(&path, MemoryBudget::UNLIMITED)?, b"x,y,z\n0,0,1\n");
+//! std::fs::remove_file(&path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![deny(unsafe_code)]
 
 mod blosc;

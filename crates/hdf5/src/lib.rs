@@ -4,6 +4,17 @@
 //! `plain` for names alone. A dialect lists the time steps and finds the values of each (`dialect`, `properties`). The values are data
 //! sets, or parts of them (`values`), in one piece or in chunks (`chunks`), which are decoded in parallel. `table`
 //! joins the parts of a step. Nothing is allocated before the shapes agree with the storage and with a budget.
+//!
+//! `spherule-formats` finds out that a file is one of HDF5, and reads it with [`FORMAT`]:
+//!
+//! ```
+//! let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/hdf5/cell-moving.h5md");
+//! let bytes = std::fs::read(file)?;
+//! let steps = spherule_hdf5::FORMAT.steps(&bytes)?;
+//! let particles = spherule_hdf5::FORMAT.read(&bytes, &steps[0])?;
+//! assert!(particles.cell.is_some() && !particles.positions.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![deny(unsafe_code)]
 
 mod band_cache;
