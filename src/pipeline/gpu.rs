@@ -198,7 +198,6 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Drawing => "render.outline",
         Missing::Holdout => "mesh",
         Missing::Detail => "environment.detail",
-        Missing::Clamp => "render.clamp",
         Missing::MirroredCatcher => "render.ground",
     }
 }
@@ -212,9 +211,7 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
     let has_colors = rules.first().color.is_by_particle() || rules.is_divided();
     let colors = if has_colors { 12 * particles } else { 0 };
     let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
-    let has_paths = picture.render.integrator == IntegratorKind::Path;
-    let of_pixel = bytes_per_pixel(has_paths, lights, picture.render.has_features);
-    tree_bytes(particles, is_common) + colors + of_pixel * pixels
+    tree_bytes(particles, is_common) + colors + bytes_per_pixel(&picture.render, lights) * pixels
 }
 
 /// Renders frame after frame on the device.

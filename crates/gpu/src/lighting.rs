@@ -31,6 +31,8 @@ pub struct Lighting {
     pub bounces: u32,
     /// If paths end at the second surface with an estimate: the distance at which half of the light arrives.
     pub ambient_reach: Option<f32>,
+    /// The limit of indirect light: the largest component that a ray may add to its sample.
+    pub indirect_limit: Option<f32>,
     /// The environment; None if it is black.
     pub environment: Option<Environment>,
     /// Whether camera rays see it instead of the background.
@@ -157,10 +159,11 @@ pub(crate) struct SceneUniform {
     catcher: [u32; 4],
     image: u32,
     is_environment_visible: u32,
-    zeros: [u32; 2],
+    indirect_limit: f32,
+    zero: u32,
     finish_count: u32,
     is_ambient: u32,
-    more_zeros: [u32; 2],
+    zeros: [u32; 2],
     finishes: [FinishUniform; MAX_FINISHES],
     harmonics: [[f32; 4]; 9],
 }
@@ -199,6 +202,7 @@ impl From<&Lighting> for SceneUniform {
             is_ambient: lighting.ambient_reach.is_some().into(),
             reach: lighting.ambient_reach.unwrap_or_default(),
             is_environment_visible: lighting.is_environment_visible.into(),
+            indirect_limit: lighting.indirect_limit.unwrap_or_default(),
             ..Self::zeroed()
         };
         for (place, finish) in uniform.finishes.iter_mut().zip(&lighting.finishes) {

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use spherule_tracer::render::PathSeed;
 
-use crate::lighting::{Model, source_count};
+use crate::lighting::{Lighting, Model, source_count};
 
 /// Largest number of lights.
 pub const MAX_LIGHTS: usize = 8;
@@ -38,6 +38,11 @@ impl Picture<'_> {
     /// Whether paths are traced.
     pub(crate) const fn has_paths(&self) -> bool {
         matches!(self.model, Model::Paths(_))
+    }
+
+    /// Whether indirect light has a limit.
+    pub(crate) const fn has_clamp(&self) -> bool {
+        matches!(self.model, Model::Paths(Lighting { indirect_limit: Some(_), .. }))
     }
 
     /// Number of sources of shadow rays.

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
+use spherule_tracer::render::{IntegratorKind, RenderSettings};
 use wgpu::BindingResource;
 
 use crate::arrays::{Array, Download, Uniform, Uniforms};
@@ -19,6 +20,8 @@ const STACK_PER_LEVEL: u32 = 7;
 const MIN_STACK_LEVELS: u32 = 6;
 /// Invocations in a workgroup.
 const GROUP: u64 = 64;
+/// Counters of the light that is lost.
+const LOST_WORDS: usize = 2;
 /// Largest number of stages whose time is measured; pictures with more samples have several in a stage.
 const MAX_STAGES: u32 = 257;
 
@@ -76,6 +79,8 @@ pub struct Cost {
     pub shadow_rays: u64,
     /// Reflected rays, also by rough surfaces.
     pub reflected_rays: u64,
+    /// Light that the clamp of indirect light took away, in the steps of `LostLight`.
+    pub lost_steps: u64,
     /// Memory of the device, bytes.
     pub bytes: u64,
     /// That of the tree and its build.
@@ -88,7 +93,7 @@ pub struct Cost {
 struct Stage {
     depth: u32,
     source: u32,
-    queues: u32,
+    counters: u32,
     zero: u32,
 }
 
@@ -107,6 +112,8 @@ struct Kernels {
     trace_camera: Kernel,
     trace_next: Kernel,
     trace_shadow: Kernel,
+    /// If indirect light has a limit.
+    clamp_indirect: Option<Kernel>,
 }
 
 /// What the source of the kernels depends on.
@@ -114,6 +121,8 @@ struct Kernels {
 struct Variant {
     /// Whether paths are traced.
     has_paths: bool,
+    /// Whether indirect light has a limit.
+    has_clamp: bool,
     /// Whether radii are equal.
     is_common: bool,
     /// Levels that the stack holds.
@@ -143,6 +152,7 @@ impl Kernels {
             device.arithmetic().source(),
             &tree_constants(variant.is_common),
             &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * variant.levels),
+            &format!("const HAS_CLAMP: bool = {};\n", variant.has_clamp),
             GROUPS,
             include_str!("shaders/view.wgsl"),
             include_str!("shaders/arithmetic.wgsl"),
@@ -175,6 +185,8 @@ impl Kernels {
             trace_camera: kernel("trace_camera", camera),
             trace_next: kernel("trace_next", next),
             trace_shadow: kernel("trace_shadow", shadow),
+            clamp_indirect: (variant.has_clamp)
+                .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18])),
         }
     }
 }
@@ -255,10 +267,15 @@ impl TraceArrays {
     }
 }
 
-/// Memory of the device for the film and the queues of each pixel with that many lights, bytes. `has_odd`: the sums over
-/// every second sample are kept.
-pub fn bytes_per_pixel(has_paths: bool, lights: u32, has_odd: bool) -> u64 {
-    let film = if has_odd { 32 } else { 16 };
+/// Memory of the film for each pixel, bytes. `has_odd`: the sums over every second sample are kept.
+const fn film_bytes(has_odd: bool, has_clamp: bool) -> u64 {
+    16 * (1 + has_odd as u64 + has_clamp as u64)
+}
+
+/// Memory of the device for the film and the queues of each pixel with that many lights, bytes.
+pub fn bytes_per_pixel(settings: &RenderSettings, lights: u32) -> u64 {
+    let has_paths = settings.integrator == IntegratorKind::Path;
+    let film = film_bytes(settings.has_features, has_paths && settings.clamp.is_some());
     4 + film + 32 + ray_bytes(has_paths) * (2 + u64::from(source_count(has_paths, lights)))
 }
 
@@ -331,6 +348,7 @@ impl Renderer {
         let shape = *self.tree.shape();
         let variant = Variant {
             has_paths: picture.has_paths(),
+            has_clamp: picture.has_clamp(),
             is_common: shape.is_common,
             levels: shape.levels.max(MIN_STACK_LEVELS),
         };
@@ -406,8 +424,9 @@ impl Renderer {
     /// Without a picture.
     pub fn cost(&self, device: &Device) -> Result<Cost, GpuError> {
         let Traced { pixels, samples, sources, .. } = self.traced.expect("a picture was traced");
+        let counts: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
+        let (lengths, lost) = counts.split_at(counts.len() - LOST_WORDS);
         // The first queue of each depth has reflected rays, the others shadow rays
-        let lengths: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
         let reflected = lengths.iter().step_by(1 + sources as usize).sum();
         let seconds = match &self.timer {
             Some(timer) => timer.seconds(device, self.stages)?,
@@ -420,6 +439,7 @@ impl Renderer {
             primary_rays: pixels * u64::from(samples),
             reflected_rays: reflected,
             shadow_rays: lengths.iter().sum::<u64>() - reflected,
+            lost_steps: lost[0].saturating_add(lost[1].saturating_mul(1 << 32)),
             bytes: self.tree.bytes() + arrays,
             tree_bytes: self.tree.bytes(),
         })
@@ -428,9 +448,9 @@ impl Renderer {
     fn reserve(&mut self, device: &Device, picture: &Picture<'_>) -> Result<(), GpuError> {
         let pixels = picture.film.pixels();
         let sources = picture.sources();
-        let film = if picture.has_odd { 32 } else { 16 };
+        let film = film_bytes(picture.has_odd, picture.has_clamp());
         let ray = ray_bytes(picture.has_paths());
-        let queues = vec![0; queue_count(picture) as usize];
+        let counters = vec![0; counter_count(picture) as usize];
         let arrays = &mut self.arrays;
         arrays.film.reserve(device, "pixels", film * pixels)?;
         arrays.data.reserve(device, "pixels", 32 * pixels)?;
@@ -441,11 +461,11 @@ impl Renderer {
         if let Model::Paths(lighting) = picture.model {
             arrays.write_tables(device, lighting)?;
         }
-        arrays.queued.write(device, "queues", bytemuck::cast_slice::<u32, u8>(&queues))?;
+        arrays.queued.write(device, "queues", bytemuck::cast_slice::<u32, u8>(&counters))?;
         arrays.sums.write(
             device,
             "counts",
-            bytemuck::cast_slice(&[&queues[..], &queues].concat()),
+            bytemuck::cast_slice(&[&counters[..], &counters].concat()),
         )?;
         // The pictures of a job have the same samples; other filters have other points
         let Samples { points, sets, .. } = picture.samples;
@@ -478,12 +498,12 @@ impl Renderer {
             Model::Whitted => None,
             Model::Paths(lighting) => Some(uniforms.push(&SceneUniform::from(lighting))),
         };
-        let queues = queue_count(picture);
+        let counters = counter_count(picture);
         let samples = 0..picture.samples.count;
         let samples = samples
             .map(|sample| uniforms.push(&Current { sample, ..Current::default() }))
             .collect();
-        let mut push = |stage: Stage| uniforms.push(&Stage { queues, ..stage });
+        let mut push = |stage: Stage| uniforms.push(&Stage { counters, ..stage });
         let mut all = |stages: &mut dyn Iterator<Item = Stage>| stages.map(&mut push).collect();
         let depths = 1..=depth_count(picture);
         let sources = 0..picture.sources();
@@ -491,7 +511,7 @@ impl Renderer {
             view,
             scene,
             film: picture.film,
-            queues,
+            counters,
             samples,
             depths: all(&mut depths.clone().map(|depth| Stage { depth, ..Stage::default() })),
             sources: depths
@@ -526,13 +546,16 @@ impl Renderer {
                 let array_of = |binding| self.array(binding, plan, [sample, *source], number);
                 commands.add(&kernels.trace_shadow, &array_of, pixels, GROUP);
             }
+            if let (Some(clamp), 1..) = (&kernels.clamp_indirect, number) {
+                commands.add(clamp, &array_of, pixels, GROUP);
+            }
         }
     }
 
     /// Adds the dispatch that empties the queues, and counts the rays that they had.
     fn add_count(&self, commands: &mut Commands<'_>, kernels: &Kernels, plan: &Plan) {
         let array_of = |binding| self.array(binding, plan, [plan.samples[0], plan.depths[0]], 0);
-        commands.add(&kernels.empty_queues, &array_of, plan.queues.into(), GROUP);
+        commands.add(&kernels.empty_queues, &array_of, plan.counters.into(), GROUP);
     }
 
     /// The argument of a kernel for a binding, in the dispatches of a depth: the queues of rays change places.
@@ -593,9 +616,12 @@ fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
     }
 }
 
-/// Number of queues of a sample: for each depth, one of rays that go on, and one of shadow rays for each source.
-fn queue_count(picture: &Picture<'_>) -> u32 {
-    depth_count(picture) * (1 + picture.sources())
+/// Number of counters of a sample: the lengths of its queues, for each depth one of rays that go on, and one of shadow rays
+/// for each source; then the light that is lost.
+fn counter_count(picture: &Picture<'_>) -> u32 {
+    #[expect(clippy::cast_possible_truncation, reason = "it is 2")]
+    let lost = LOST_WORDS as u32;
+    depth_count(picture) * (1 + picture.sources()) + lost
 }
 
 /// The uniforms of a picture.
@@ -604,8 +630,8 @@ struct Plan {
     /// The lighting of paths.
     scene: Option<Uniform>,
     film: FilmSize,
-    /// Number of queues of a sample.
-    queues: u32,
+    /// Number of counters of a sample.
+    counters: u32,
     samples: Vec<Uniform>,
     depths: Vec<Uniform>,
     /// The sources of shadow rays of each depth.

@@ -54,8 +54,6 @@ pub enum Missing {
     Holdout,
     /// An image of the environment at its own resolution.
     Detail,
-    /// A clamp of indirect light.
-    Clamp,
     /// Metal or plastic that sees the environment through a shadow catcher.
     MirroredCatcher,
 }
@@ -75,7 +73,6 @@ impl fmt::Display for Missing {
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
             Self::Detail => "an image of the environment at its own resolution",
-            Self::Clamp => "a clamp of indirect light",
             Self::MirroredCatcher => {
                 "metal and plastic above a shadow catcher without a background"
             }
@@ -105,7 +102,6 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
         (scene.environment.as_ref().is_some_and(|map| map.has_detail()), Missing::Detail),
-        (settings.clamp.is_some() && !is_whitted, Missing::Clamp),
         (mirrors_see_through(scene, settings) && !is_whitted, Missing::MirroredCatcher),
     ]
     .into_iter()
@@ -331,7 +327,7 @@ pub const fn ray_counts(cost: &Cost) -> RayCounts {
         shadow: cost.shadow_rays,
         reflection: cost.reflected_rays,
         refraction: 0,
-        lost: LostLight::NONE,
+        lost: LostLight::from_steps(cost.lost_steps),
     }
 }
 

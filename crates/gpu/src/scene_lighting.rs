@@ -72,6 +72,7 @@ impl SceneLighting {
         lighting.ground = scene.ground.as_ref().map(|ground| ground_of(ground, catcher));
         lighting.is_environment_visible = scene.is_environment_visible;
         lighting.bounces = settings.traced_bounces();
+        lighting.indirect_limit = settings.clamp;
         lighting.ambient_reach = match settings.indirect {
             IndirectLight::Traced => None,
             IndirectLight::Ambient { radius } => Some(ambient_reach(radius)),
@@ -101,6 +102,7 @@ fn prepared(key: &Key) -> Lighting {
         finishes,
         bounces: 0,
         ambient_reach: None,
+        indirect_limit: None,
         is_environment_visible: false,
         tables,
     }

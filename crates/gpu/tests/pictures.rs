@@ -95,6 +95,25 @@ fn paths_are_those_of_the_cpu() {
 }
 
 #[test]
+fn indirect_light_has_the_limit_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    for paths in [Paths::Plastic, Paths::Metal, Paths::Catcher, Paths::Lights, Paths::Ambient] {
+        let clamp = Some(0.1);
+        let case = Case { paths: Some(paths), samples: 5, particles: 400, clamp, ..Case::small() };
+        let found = support::compare(&mut renderer, &case, level);
+        let Difference { ids, depths, mean, bias, odd, lost: [lost, expected], .. } = found;
+        assert_eq!([ids, depths], [0; 2], "{paths:?}");
+        assert!(mean.max(bias).max(odd) < 1e-3, "{paths:?}: {found:?}");
+        assert!(expected > 1e-3 && (lost / expected - 1.0).abs() < 1e-3, "{paths:?}: {found:?}");
+    }
+    // A limit that nothing reaches takes nothing
+    let case = Case { paths: Some(Paths::Metal), clamp: Some(1e6), ..Case::small() };
+    assert_eq!(support::film(&mut renderer, &case).1.lost_steps, 0);
+}
+
+#[test]
 fn every_run_gives_the_same_bytes() {
     let Some(device) = device(Checks::Off) else { return };
     let mut renderer = SceneRenderer::new(Arc::new(device));

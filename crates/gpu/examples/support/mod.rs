@@ -109,6 +109,8 @@ pub(crate) struct Case {
     pub(crate) window: Option<[i32; 2]>,
     /// Path tracing; else Whitted's model.
     pub(crate) paths: Option<Paths>,
+    /// Limit of indirect light.
+    pub(crate) clamp: Option<f32>,
 }
 
 impl Case {
@@ -128,6 +130,7 @@ impl Case {
             is_studio: false,
             window: None,
             paths: None,
+            clamp: None,
         }
     }
 
@@ -160,6 +163,7 @@ impl Case {
             samples: self.samples,
             seed: self.seed,
             max_depth: self.max_depth,
+            clamp: self.clamp,
             channels: Channels::from_names(names).expect("known names"),
             window: self.window.map(|[left, top]| DataWindow {
                 image: [self.width, self.height],
@@ -364,6 +368,8 @@ pub(crate) struct Difference {
     pub(crate) rays: bool,
     /// Rays to other surfaces and to lights, relative to those of the CPU.
     pub(crate) ray_ratio: f64,
+    /// The part of the light that a clamp takes away, here and on the CPU.
+    pub(crate) lost: [f64; 2],
 }
 
 fn shading<'a>(particles: &'a Particles, map: &'a ColorMap) -> ParticleShading<'a> {
@@ -465,6 +471,8 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
         mean: sum(&distance) / total,
         bias: (sum(&|a, _| rgb(a)) / total - 1.0).abs(),
         odd: odd.map(|(a, b)| distance(&a, &b)).sum::<f64>() / total,
+        lost: [(&found, ray_counts(&cost)), (&expected, rays)]
+            .map(|(film, rays)| rays.lost.part(&film.color, case.samples)),
         ray_ratio: secondary(ray_counts(&cost)) / secondary(rays).max(1.0),
         ids: differing(FilmPlane::Id, 1),
         depths: differing(FilmPlane::Depth, 1),

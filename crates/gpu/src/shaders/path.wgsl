@@ -25,6 +25,10 @@ const MAX_CONTINUATION: f32 = 0.95;
 // The part of the light that arrives at a second surface far away, for ambient light
 const MAX_AMBIENT: f32 = 0.8;
 
+// Steps of a unit of radiance in which the light that a clamp takes away is counted, and the largest count
+const LOST_STEPS: f32 = 4096.0;
+const MAX_LOST: f32 = 1.8e19;
+
 const LUMINANCE: vec3<f32> = vec3<f32>(0.2126, 0.7152, 0.0722);
 
 // A path up to a ray
@@ -171,6 +175,20 @@ fn roulette(next: Next, bounces: u32, seed: Wide) -> Next {
   return Next(next.is_ray && goes_on, next.direction, next.throughput / chance, next.pdf);
 }
 
+// The place in the film of the indirect light that is being traced for a pixel
+fn indirect_place(pixel: u32) -> u32 { return (1u + view.has_odd) * view.width * view.height + pixel; }
+
+// Adds the light along a ray. A clamp limits what it brings to its first surface, but `direct`; that stays apart until
+// its shadow rays are traced.
+fn add_light(pixel: u32, light: vec4<f32>, direct: vec4<f32>) {
+  if (!HAS_CLAMP || stage.depth == 1u) {
+    add_to_film(pixel, light);
+    return;
+  }
+  add_to_film(pixel, direct);
+  film[indirect_place(pixel)] = light - direct;
+}
+
 // Adds what a ray sees without shadows, and appends the rays that leave its intersection.
 fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   var sum = vec4<f32>(0.0);
@@ -197,6 +215,8 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
       sum += vec4<f32>(uncovered * path.throughput * environment_along(ray.direction, pdf), 0.0);
     }
   }
+  // The first surface reflects this light, which has no limit
+  let direct = select(vec4<f32>(0.0), sum, stage.depth == 2u);
   // The point of the surface
   var vertex: Vertex;
   var weight = path.throughput;
@@ -266,7 +286,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
   }
-  if (is_ray) { add_to_film(path.pixel, sum); }
+  if (is_ray) { add_light(path.pixel, sum, direct); }
 }
 
 // Camera rays, in squares of 8x8 pixels.
@@ -334,5 +354,40 @@ fn trace_shadow(
   let adds = light.w == ADDS;
   if (is_blocked == adds) { return; }
   let coverage = select(0.0, light.w, !adds && view.transparent == 1u);
-  add_to_film(bitcast<u32>(start.w), vec4<f32>(light.xyz, coverage));
+  let pixel = bitcast<u32>(start.w);
+  if (HAS_CLAMP && stage.depth > 1u) {
+    film[indirect_place(pixel)] += vec4<f32>(light.xyz, 0.0);
+  } else {
+    add_to_film(pixel, vec4<f32>(light.xyz, coverage));
+  }
+}
+
+// Counts light that a clamp takes away.
+fn count_lost(radiance: vec3<f32>) {
+  let steps = clamp((radiance.x + radiance.y + radiance.z) * LOST_STEPS, 0.0, MAX_LOST);
+  let upper = u32(steps / 4294967296.0);
+  let lower = u32(steps - f32(upper) * 4294967296.0);
+  let before = atomicAdd(&queued[stage.counters - 2u], lower);
+  atomicAdd(&queued[stage.counters - 1u], upper + select(0u, 1u, before + lower < lower));
+}
+
+// Adds the indirect light of the rays of a depth, up to the limit.
+@compute @workgroup_size(GROUP)
+fn clamp_indirect(
+  @builtin(workgroup_id) group: vec3<u32>,
+  @builtin(num_workgroups) groups: vec3<u32>,
+  @builtin(local_invocation_index) local: u32,
+) {
+  let i = linear_index(group, groups, local, GROUP);
+  if (i >= atomicLoad(&queued[queue_of(stage.depth - 1u)])) { return; }
+  let pixel = bitcast<u32>(rays[RAY * i].w);
+  let light = film[indirect_place(pixel)];
+  let largest = largest_of(light.xyz);
+  // What is not finite stays, so that faults are visible
+  var part = 1.0;
+  if (largest > scene.indirect_limit && largest < FAR) {
+    part = scene.indirect_limit / largest;
+    count_lost(light.xyz * (1.0 - part));
+  }
+  add_to_film(pixel, light * part);
 }
