@@ -120,13 +120,11 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
         (picture.view.shutter.is_some()).then(|| ("camera.shutter", "motion blur".to_owned())),
         (picture.surface.kind != SurfaceKind::Spheres)
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
-        (rules.first().opacity != OpacityRule::OPAQUE)
-            .then(|| ("material.opacity", "opacities below 1".to_owned())),
         rules.first().bonds.is_some().then(|| ("bonds", "bonds".to_owned())),
         (rules.styles.len() > MAX_FINISHES)
             .then(|| ("style", format!("more than {} styles", MAX_FINISHES - 1))),
         (!rules.others().iter().all(|style| is_plain(setup, style)))
-            .then(|| ("style", "other styles than opaque spheres".to_owned())),
+            .then(|| ("style", "styles of anything but spheres".to_owned())),
         (!rules.cut.is_everywhere()).then(|| ("clip", "particles that are cut".to_owned())),
         (!things.meshes.is_empty()).then(|| ("mesh", "meshes".to_owned())),
         (things.cell.is_some()).then(|| ("cell", "the simulation cell".to_owned())),
@@ -138,7 +136,7 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     .next()
 }
 
-/// Whether the particles of a style are opaque spheres, whose material differs from that of others only in how paths leave
+/// Whether the particles of a style are spheres that light does not enter, whose material differs from that of others only in how paths leave
 /// it.
 fn is_plain(setup: &Setup, style: &ParticleStyle) -> bool {
     let picture = &setup.picture;
@@ -154,7 +152,6 @@ fn is_plain(setup: &Setup, style: &ParticleStyle) -> bool {
     };
     let is_traced = picture.render.integrator == IntegratorKind::Path;
     matches!(style.form, StyleForm::Spheres)
-        && style.opacity == OpacityRule::OPAQUE
         && style.bonds.is_none()
         && is_known
         && own.transmission == 0.0
@@ -209,7 +206,12 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
     let is_common = matches!(rules.first().radius, RadiusRule::Common(_)) && !rules.is_divided();
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
     let has_colors = rules.first().color.is_by_particle() || rules.is_divided();
-    let colors = if has_colors { 12 * particles } else { 0 };
+    let is_opaque = |style: &ParticleStyle| style.opacity == OpacityRule::OPAQUE;
+    let colors = match (rules.styles.iter().all(is_opaque), has_colors) {
+        (false, _) => 16 * particles,
+        (true, true) => 12 * particles,
+        (true, false) => 0,
+    };
     let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
     tree_bytes(particles, is_common) + colors + bytes_per_pixel(&picture.render, lights) * pixels
 }

@@ -99,7 +99,7 @@ mod on_a_device {
             "--style",
             "x > 1: spheres, radius 0.03, color gold, material { type = \"metal\", roughness = 0.3 }",
             "--style",
-            "x > 0.5: spheres, color red, material { type = \"plastic\" }",
+            "x > 0.5: spheres, color red, opacity 0.4, material { type = \"plastic\" }",
             "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\"]",
         ];
         for (number, look) in [&whitted[..], &paths].into_iter().enumerate() {
@@ -109,8 +109,11 @@ mod on_a_device {
             }
             assert_equal(&workshop, [&gpu, &cpu]);
         }
-        let refused = [&DEVICE[..], &["--style", "x > 0.5: spheres, opacity 0.5"]].concat();
-        workshop.render_to("refused", &with(&refused)).expect(2).prints("other styles than opaque");
+        let refused = [&DEVICE[..], &["--style", "x > 0.5: union"]].concat();
+        workshop
+            .render_to("refused", &with(&refused))
+            .expect(2)
+            .prints("styles of anything but spheres");
     }
 
     /// A device that is a program on the CPU is taken only where it is asked for.
@@ -128,9 +131,9 @@ mod on_a_device {
             assert!(report.contains("\"driver\""), "{report}");
         }
         // The first reason names its key, and no device is looked for
-        let lacking = ["still", "in", "-o", "a.png", "--opacity=0.5", "--gpu=99"];
+        let lacking = ["still", "in", "-o", "a.png", "--surface=union", "--gpu=99"];
         let ran = workshop.run(&[&lacking[..], &SMALL].concat()).expect(0);
-        ran.prints("rendered on the CPU: material.opacity: opacities below 1");
+        ran.prints("rendered on the CPU: render.surface: other surfaces");
     }
 
     #[test]
@@ -165,7 +168,6 @@ mod on_a_device {
             ),
             (&[whitted, "--ground=checker"], "render.ground: a ground"),
             (&[whitted, "--surface=union"], "render.surface"),
-            (&[whitted, "--opacity=0.5"], "material.opacity"),
             (&[whitted, "--gpu=9"], "there is no GPU 9"),
         ] {
             let still = ["still", "in", "-o", "a.png", "--device=gpu"];

@@ -3,7 +3,7 @@
 //!
 //! - [`Device`]: adapters, limits, and the self-test of the arithmetic.
 //! - [`Spheres`]: the order along a Hilbert curve, blocks of eight, levels of nodes.
-//! - [`Renderer`] and [`Picture`]: opaque spheres by Whitted's model, or by path tracing in a [`Lighting`].
+//! - [`Renderer`] and [`Picture`]: spheres by Whitted's model, or by path tracing in a [`Lighting`].
 //!
 //! This crate takes slices and plain values, and returns pixels: it knows no files, jobs or scenes. Which sphere a pixel
 //! shows, its depth, normal, position and coverage equal those of the CPU's kernels to the bit, if the device passes
@@ -25,6 +25,7 @@
 //!     centers: Centers::Points(&[[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]]),
 //!     radii: Radii::Common(0.8),
 //!     order: Order::Any(KeyLength::Short),
+//!     keeps_copies: false,
 //! };
 //! renderer.prepare(&device, &spheres, Colors::Constant([0.8, 0.2, 0.1]))?;
 //! let film = FilmSize { width: 16, height: 8, corner: [0, 0] };

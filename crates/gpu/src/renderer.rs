@@ -32,6 +32,8 @@ pub enum Colors<'a> {
     Constant([f32; 3]),
     /// One for each sphere.
     PerSphere(&'a [[f32; 3]]),
+    /// One for each sphere, with its opacity: how much of what is behind it the sphere covers.
+    WithOpacity(&'a [[f32; 4]]),
 }
 
 /// The pixels of a picture, row by row.
@@ -121,6 +123,8 @@ struct Kernels {
 struct Variant {
     /// Whether paths are traced.
     has_paths: bool,
+    /// Whether spheres have an opacity each.
+    has_opacity: bool,
     /// Whether indirect light has a limit.
     has_clamp: bool,
     /// Whether radii are equal.
@@ -130,9 +134,8 @@ struct Variant {
 }
 
 /// The sources of path tracing.
-const PATHS: [&str; 6] = [
+const PATHS: [&str; 5] = [
     include_str!("shaders/scene.wgsl"),
-    include_str!("shaders/sampler.wgsl"),
     include_str!("shaders/environment.wgsl"),
     include_str!("shaders/ground.wgsl"),
     include_str!("shaders/bsdf.wgsl"),
@@ -152,6 +155,7 @@ impl Kernels {
             device.arithmetic().source(),
             &tree_constants(variant.is_common),
             &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * variant.levels),
+            &format!("const HAS_OPACITY: bool = {};\n", variant.has_opacity),
             &format!("const HAS_CLAMP: bool = {};\n", variant.has_clamp),
             GROUPS,
             include_str!("shaders/view.wgsl"),
@@ -162,6 +166,7 @@ impl Kernels {
             include_str!("shaders/surface.wgsl"),
             include_str!("shaders/lights.wgsl"),
             include_str!("shaders/queues.wgsl"),
+            include_str!("shaders/sampler.wgsl"),
             append,
             &model.concat(),
         ];
@@ -171,13 +176,13 @@ impl Kernels {
             [
                 &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18],
                 &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18],
-                &[0, 1, 2, 6, 8, 11, 13, 15, 18],
+                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18],
             ]
         } else {
             [
                 &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18],
                 &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18],
-                &[0, 1, 2, 6, 8, 11, 13, 18],
+                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 18],
             ]
         };
         Self {
@@ -201,6 +206,7 @@ pub struct Renderer {
     timer: Option<Timer>,
     download: Download,
     has_colors: bool,
+    has_opacity: bool,
     color: [f32; 3],
     /// The picture that was traced last.
     traced: Option<Traced>,
@@ -290,6 +296,7 @@ impl Renderer {
             timer: Timer::new(device, MAX_STAGES),
             download: Download::default(),
             has_colors: false,
+            has_opacity: false,
             color: [0.0; 3],
             traced: None,
             stages: 0,
@@ -309,17 +316,17 @@ impl Renderer {
         spheres: &Spheres<'_>,
         colors: Colors<'_>,
     ) -> Result<(), GpuError> {
-        match colors {
+        let bytes: &[u8] = match colors {
             Colors::Constant(color) => {
                 self.color = color;
-                self.arrays.colors.reserve(device, "colours", 0)?;
+                &[]
             }
-            Colors::PerSphere(colors) => {
-                let bytes = bytemuck::cast_slice(colors);
-                self.arrays.colors.write(device, "colours", bytes)?;
-            }
-        }
-        self.has_colors = matches!(colors, Colors::PerSphere(_));
+            Colors::PerSphere(colors) => bytemuck::cast_slice(colors),
+            Colors::WithOpacity(colors) => bytemuck::cast_slice(colors),
+        };
+        self.arrays.colors.write(device, "colours", bytes)?;
+        self.has_colors = !matches!(colors, Colors::Constant(_));
+        self.has_opacity = matches!(colors, Colors::WithOpacity(_));
         self.tree.build(device, spheres, self.timer.as_ref())
     }
 
@@ -348,6 +355,7 @@ impl Renderer {
         let shape = *self.tree.shape();
         let variant = Variant {
             has_paths: picture.has_paths(),
+            has_opacity: self.has_opacity,
             has_clamp: picture.has_clamp(),
             is_common: shape.is_common,
             levels: shape.levels.max(MIN_STACK_LEVELS),

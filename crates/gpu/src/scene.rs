@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
     DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, mirrors_see_through, store_pixels,
@@ -184,7 +184,8 @@ impl SceneRenderer {
         };
         let order = Order::Any(key_length(spheres.centers));
         let centers = Centers::Points(bytemuck::cast_slice(spheres.centers));
-        self.start(&Spheres { centers, radii, order }, spheres.centers.len(), source)
+        let keeps_copies = source.is_translucent();
+        self.start(&Spheres { centers, radii, order, keeps_copies }, spheres.centers.len(), source)
     }
 
     /// Same as [`Self::prepare`], of the leaves of a native frame, whose particles are in the order of a tree. `radius` is
@@ -218,7 +219,12 @@ impl SceneRenderer {
             }
         };
         let centers = Centers::Blocks { blocks: bytemuck::cast_slice(blocks), count: leaves.count };
-        let spheres = Spheres { centers, radii, order: Order::AlongCurve };
+        let spheres = Spheres {
+            centers,
+            radii,
+            order: Order::AlongCurve,
+            keeps_copies: source.is_translucent(),
+        };
         let count = usize::try_from(leaves.count).unwrap_or(usize::MAX);
         self.start(&spheres, count, source)
     }
@@ -229,14 +235,18 @@ impl SceneRenderer {
         count: usize,
         source: &dyn ShadeSource,
     ) -> Result<(), GpuError> {
-        let colors: Vec<Vec3>;
-        let colors = match source.constant_color() {
-            Some(color) => Colors::Constant(color.to_array()),
-            None => {
-                let count = u32::try_from(count).unwrap_or(u32::MAX);
-                colors = (0..count).into_par_iter().map(|index| source.color(index)).collect();
-                Colors::PerSphere(bytemuck::cast_slice(&colors))
-            }
+        let indices = (0..u32::try_from(count).unwrap_or(u32::MAX)).into_par_iter();
+        let each: Vec<Vec3>;
+        let with_opacity: Vec<Vec4>;
+        let colors = if source.is_translucent() {
+            let color = |index| source.color(index).extend(source.opacity(index));
+            with_opacity = indices.map(color).collect();
+            Colors::WithOpacity(bytemuck::cast_slice(&with_opacity))
+        } else if let Some(color) = source.constant_color() {
+            Colors::Constant(color.to_array())
+        } else {
+            each = indices.map(|index| source.color(index)).collect();
+            Colors::PerSphere(bytemuck::cast_slice(&each))
         };
         self.renderer.prepare(&self.device, spheres, colors)
     }

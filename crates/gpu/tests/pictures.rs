@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
 use spherule_tree::math::SimdLevel;
-use support::{Case, Data, Difference, Paths, Radii};
+use support::{Case, Data, Difference, Opacity, Paths, Radii};
 
 /// Half the distance of neighbouring 16-bit floats below 2, where the colours of these pictures are.
 const HALF_UNIT_OF_F16: f32 = 0.5 / 1024.0;
@@ -91,6 +91,35 @@ fn paths_are_those_of_the_cpu() {
         }
         assert!(mean.max(bias).max(odd) < 1e-3, "{paths:?}: {found:?}");
         assert!((ray_ratio - 1.0).abs() < 1e-3, "{paths:?}: {found:?}");
+    }
+}
+
+/// Rays end at the same spheres, which random numbers choose; shadow rays lose the same part of their light.
+#[test]
+fn opacities_are_those_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    let small = Case { opacity: Some(Opacity::Common(0.4)), ..Case::small() };
+    for case in [
+        small,
+        Case { opacity: Some(Opacity::Each), is_mapped: true, is_studio: true, ..small },
+        Case { opacity: Some(Opacity::Common(0.0)), ..small },
+        Case { radii: Radii::Each, data: Data::Clusters, seed: 3, ..small },
+        Case { data: Data::Coincident, particles: 50, ..small },
+    ] {
+        assert_equal(&case, &support::compare(&mut renderer, &case, level));
+    }
+    for paths in [Paths::Matte, Paths::Metal, Paths::Catcher, Paths::Lights] {
+        let case = Case { paths: Some(paths), particles: 400, samples: 5, ..small };
+        for opacity in [Opacity::Common(0.4), Opacity::Each] {
+            let case = Case { opacity: Some(opacity), ..case };
+            let found = support::compare(&mut renderer, &case, level);
+            let Difference { ids, depths, mean, bias, odd, ray_ratio, .. } = found;
+            assert_eq!([ids, depths], [0; 2], "{case:?}");
+            assert!(mean.max(bias).max(odd) < 1e-3, "{case:?}: {found:?}");
+            assert!((ray_ratio - 1.0).abs() < 1e-3, "{case:?}: {found:?}");
+        }
     }
 }
 

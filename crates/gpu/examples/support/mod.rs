@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
 use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{
-    Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, ParticleShading,
-    RayCounts, RenderSettings, render,
+    Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, Opacities,
+    ParticleShading, RayCounts, RenderSettings, render,
 };
 use spherule_tracer::scene::environment::{self, Environment, EnvironmentAxes};
 use spherule_tracer::scene::ground::{Ground, Pattern};
@@ -47,6 +47,15 @@ pub(crate) enum Radii {
     /// All equal.
     Common,
     /// Over two decades; in clusters over four, in proportion to the distance from their centre.
+    Each,
+}
+
+/// Opacities of particles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Opacity {
+    /// All equal.
+    Common(f32),
+    /// From 0 to 1, of some exactly that.
     Each,
 }
 
@@ -109,6 +118,8 @@ pub(crate) struct Case {
     pub(crate) window: Option<[i32; 2]>,
     /// Path tracing; else Whitted's model.
     pub(crate) paths: Option<Paths>,
+    /// Opacities: one, or by an attribute.
+    pub(crate) opacity: Option<Opacity>,
     /// Limit of indirect light.
     pub(crate) clamp: Option<f32>,
 }
@@ -130,6 +141,7 @@ impl Case {
             is_studio: false,
             window: None,
             paths: None,
+            opacity: None,
             clamp: None,
         }
     }
@@ -241,7 +253,7 @@ impl Particles {
                 .collect(),
             common,
             radii,
-            values: if case.is_mapped {
+            values: if case.is_mapped || case.opacity == Some(Opacity::Each) {
                 (0..count).map(|particle| uniform(8 * particle + 7)).collect()
             } else {
                 Vec::new()
@@ -372,14 +384,22 @@ pub(crate) struct Difference {
     pub(crate) lost: [f64; 2],
 }
 
-fn shading<'a>(particles: &'a Particles, map: &'a ColorMap) -> ParticleShading<'a> {
+fn shading<'a>(case: &Case, particles: &'a Particles, map: &'a ColorMap) -> ParticleShading<'a> {
     let color = Vec3::new(0.6, 0.7, 0.9);
-    let colors = if particles.values.is_empty() {
-        Colors::Constant(color)
-    } else {
-        Colors::Mapped { values: &particles.values, map }
-    };
-    ParticleShading { colors, ..ParticleShading::constant(color) }
+    let values = &particles.values[..];
+    ParticleShading {
+        colors: if case.is_mapped {
+            Colors::Mapped { values, map }
+        } else {
+            Colors::Constant(color)
+        },
+        opacities: match case.opacity {
+            Some(Opacity::Common(opacity)) => Opacities::Constant(opacity),
+            Some(Opacity::Each) => Opacities::Mapped { values, range: [0.2, 0.9] },
+            None => Opacities::Constant(1.0),
+        },
+        ..ParticleShading::constant(color)
+    }
 }
 
 fn color_map() -> ColorMap {
@@ -389,13 +409,13 @@ fn color_map() -> ColorMap {
 /// Copies the particles of `case` to the device.
 pub(crate) fn prepare(renderer: &mut SceneRenderer, case: &Case) -> Result<(), GpuError> {
     let particles = Particles::new(case);
-    renderer.prepare(&particles.spheres(), &shading(&particles, &color_map()))
+    renderer.prepare(&particles.spheres(), &shading(case, &particles, &color_map()))
 }
 
 /// The film of the device.
 pub(crate) fn film(renderer: &mut SceneRenderer, case: &Case) -> (Film, Cost) {
     let (particles, map) = (Particles::new(case), color_map());
-    film_of(renderer, case, &particles, &shading(&particles, &map), 0.0)
+    film_of(renderer, case, &particles, &shading(case, &particles, &map), 0.0)
 }
 
 pub(crate) fn film_of(
@@ -417,7 +437,7 @@ pub(crate) fn film_of(
 /// A picture that is stopped from the start.
 pub(crate) fn stopped(renderer: &mut SceneRenderer, case: &Case) -> Result<Cost, SceneError> {
     let (particles, map) = (Particles::new(case), color_map());
-    let shading = shading(&particles, &map);
+    let shading = shading(case, &particles, &map);
     renderer.prepare(&particles.spheres(), &shading)?;
     let raised = AtomicBool::new(true);
     let mut film = Film::default();
@@ -443,7 +463,7 @@ pub(crate) fn film_of_cpu(
 /// Renders `case` on both, and compares all planes.
 pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLevel) -> Difference {
     let (particles, map) = (Particles::new(case), color_map());
-    let shading = shading(&particles, &map);
+    let shading = shading(case, &particles, &map);
     let (found, cost) = film_of(renderer, case, &particles, &shading, 0.0);
     let (expected, rays) = film_of_cpu(case, &particles, &shading, level);
     let differing = |plane, components: usize| {

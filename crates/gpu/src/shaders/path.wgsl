@@ -1,11 +1,11 @@
-// Path tracing of opaque spheres on a ground, as the CPU's integrator, with the same random numbers.
+// Path tracing of spheres on a ground, as the CPU's integrator, with the same random numbers.
 //
 // At each point of a surface, a direction is sampled from the environment and one from the BSDF, weighted by the balance
 // heuristic, and each light is sampled. The path goes on in the direction of the BSDF; from the third reflection on it
 // ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights.
 //
 // A ray that goes on has its direction and density, and its throughput beside its origin. A shadow ray has its direction
-// and length, and its radiance. A shadow ray from a shadow catcher takes light away if it is blocked, and adds coverage.
+// and length, and its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage.
 
 const RAY: u32 = 3u;
 const SHADOW: u32 = 3u;
@@ -51,16 +51,6 @@ fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
     shadows[SHADOW * place + 1u] = vec4<f32>(shadow.direction, shadow.length);
     shadows[SHADOW * place + 2u] = vec4<f32>(shadow.radiance, shadow.coverage);
   }
-}
-
-// The seed of the random numbers of a pixel after a number of reflections: to find it again costs less than to keep it
-// in queues
-fn seed_at(pixel: u32, bounces: u32) -> Wide {
-  let x = i32(pixel % view.width) + view.corner.x;
-  let y = i32(pixel / view.width) + view.corner.y;
-  var seed = seed_of_pixel(u32(x), u32(y)) ^ view.sequence;
-  for (var i = 0u; i < bounces; i++) { seed = child_of(seed, BOUNCED); }
-  return seed;
 }
 
 // The light of a sample that a surface reflects. `competes`: rays of the BSDF find that light, too.
@@ -202,7 +192,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   let is_sphere = is_open && hit.slot != MISS;
   let is_ground = is_open && hit.slot == MISS && ground.t < FAR;
   var seed = Wide(0u);
-  if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces); }
+  if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces, BOUNCED); }
   // A catcher shows its shadows only
   let is_caught = is_first && is_ground && scene.is_catcher == 1u;
   // What is behind all surfaces, and behind a ground that fades out
@@ -303,11 +293,11 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
     path.on_film = film_position(id.x, id.y, current.sample);
     ray = camera_ray(path.on_film);
     if (view.lens_radius > 0.0) {
-      let seed = child_of(seed_at(pixel, 0u), CAMERA);
+      let seed = child_of(seed_at(pixel, 0u, BOUNCED), CAMERA);
       ray = through_lens(ray, numbers_2d(seed, LENS, current.sample));
     }
     ground = hit_ground(ray);
-    hit = nearest(ray, ground.t);
+    hit = nearest(ray, ground.t, number_of_end(pixel, BOUNCED));
   }
   follow(is_ray, ray, path, ground, hit);
 }
@@ -331,7 +321,7 @@ fn trace_next(
     ray = Ray(origin.xyz, direction.xyz);
     path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0));
     ground = hit_ground(ray);
-    hit = nearest(ray, ground.t);
+    hit = nearest(ray, ground.t, number_of_end(path.pixel, BOUNCED));
   }
   follow(is_ray, ray, path, ground, hit);
 }
@@ -350,15 +340,17 @@ fn trace_shadow(
   let into = shadows[place + 1u];
   let light = shadows[place + 2u];
   let ray = Ray(start.xyz, into.xyz);
-  let is_blocked = is_below_ground(ray, into.w) || is_occluded(ray, into.w);
+  var passing = 0.0;
+  if (!is_below_ground(ray, into.w)) { passing = transmittance(ray, into.w); }
   let adds = light.w == ADDS;
-  if (is_blocked == adds) { return; }
-  let coverage = select(0.0, light.w, !adds && view.transparent == 1u);
+  let part = select(1.0 - passing, passing, adds);
+  if (part == 0.0) { return; }
+  let coverage = part * select(0.0, light.w, !adds && view.transparent == 1u);
   let pixel = bitcast<u32>(start.w);
   if (HAS_CLAMP && stage.depth > 1u) {
-    film[indirect_place(pixel)] += vec4<f32>(light.xyz, 0.0);
+    film[indirect_place(pixel)] += vec4<f32>(part * light.xyz, 0.0);
   } else {
-    add_to_film(pixel, vec4<f32>(light.xyz, coverage));
+    add_to_film(pixel, vec4<f32>(part * light.xyz, coverage));
   }
 }
 

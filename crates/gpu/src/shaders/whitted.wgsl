@@ -1,4 +1,4 @@
-// Whitted ray tracing of opaque spheres: equation 4.1 of the thesis, as the CPU's integrator.
+// Whitted ray tracing of spheres: equation 4.1 of the thesis, as the CPU's integrator.
 //
 // Rays are computed with the operations of the CPU, so that they meet the same spheres; colours are not, so that they
 // may differ in the last bits. The sources of shadow rays are the lights. A ray that goes on has its direction and
@@ -122,7 +122,7 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
     if (current.sample == 0u) { clear_pixel(pixel); }
     on_film = film_position(id.x, id.y, current.sample);
     ray = camera_ray(on_film);
-    hit = nearest(ray, FAR);
+    hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
   }
   follow(is_ray, ray, 1.0, pixel, hit, on_film);
 }
@@ -146,7 +146,7 @@ fn trace_next(
     ray = Ray(origin.xyz, direction.xyz);
     throughput = direction.w;
     pixel = bitcast<u32>(origin.w);
-    hit = nearest(ray, FAR);
+    hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
   }
   follow(is_ray, ray, throughput, pixel, hit, vec2<f32>(0.0));
 }
@@ -163,7 +163,8 @@ fn trace_shadow(
   let place = i + first_shadow(stage.source);
   let start = shadows[SHADOW * place];
   let into = toward(view.lights[stage.source], start.xyz);
-  if (!is_occluded(Ray(start.xyz, into.xyz), into.w)) {
-    add_to_film(bitcast<u32>(start.w), vec4<f32>(shadows[SHADOW * place + 1u].xyz, 0.0));
+  let passing = transmittance(Ray(start.xyz, into.xyz), into.w);
+  if (passing > 0.0) {
+    add_to_film(bitcast<u32>(start.w), vec4<f32>(passing * shadows[SHADOW * place + 1u].xyz, 0.0));
   }
 }
