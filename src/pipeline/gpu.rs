@@ -21,7 +21,7 @@ use crate::render::{
 use crate::report::FrameReport;
 use crate::report::frame::{BuildSummary, DeviceSummary};
 use crate::scene::material::DEFAULT_COLOR;
-use crate::scene::{Finish, Material};
+use crate::scene::{Environment, Finish, Material};
 use crate::surface::SurfaceKind;
 
 /// The number of the adapter that the user chose.
@@ -179,6 +179,12 @@ pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
     if particles > most {
         return Err(Some(format!("a frame has {particles} particles, and {name} takes {most}")));
     }
+    if detail_bytes(setup) > *max_array {
+        let most = max_array >> 20;
+        return Err(Some(format!(
+            "environment.detail: the image is larger than the {most} MiB that {name} takes"
+        )));
+    }
     Ok(())
 }
 
@@ -194,9 +200,14 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Layers => "output.channels",
         Missing::Drawing => "render.outline",
         Missing::Holdout => "mesh",
-        Missing::Detail => "environment.detail",
         Missing::MirroredCatcher => "render.ground",
     }
+}
+
+/// Memory of the image of the environment at its own resolution, bytes.
+fn detail_bytes(setup: &Setup) -> u64 {
+    let environment = setup.picture.scene.environment.as_deref();
+    environment.and_then(Environment::detail).map_or(0, |(map, _)| map.byte_len())
 }
 
 /// Memory of the device for a frame with that many particles, bytes.
@@ -213,7 +224,8 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
         (true, false) => 0,
     };
     let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
-    tree_bytes(particles, is_common) + colors + bytes_per_pixel(&picture.render, lights) * pixels
+    let of_pixels = bytes_per_pixel(&picture.render, lights) * pixels;
+    tree_bytes(particles, is_common) + colors + of_pixels + detail_bytes(setup)
 }
 
 /// Renders frame after frame on the device.

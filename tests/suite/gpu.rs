@@ -94,12 +94,12 @@ mod on_a_device {
     #[test]
     fn styles_of_spheres_are_those_of_the_cpu() {
         let Some(workshop) = workshop_with_device() else { return };
-        let whitted = with(&["--style", "x > 0.5: spheres, radius 0.03, color red"]);
+        let whitted = with(&["--style", "x > 0.5: spheres, radius 0.03, color red, opacity 0.4"]);
         let paths = [
             "--style",
             "x > 1: spheres, radius 0.03, color gold, material { type = \"metal\", roughness = 0.3 }",
             "--style",
-            "x > 0.5: spheres, color red, opacity 0.4, material { type = \"plastic\" }",
+            "x > 0.5: spheres, color red, material { type = \"plastic\" }",
             "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\"]",
         ];
         for (number, look) in [&whitted[..], &paths].into_iter().enumerate() {

@@ -90,7 +90,8 @@ pub use arithmetic::Arithmetic;
 pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
 pub use lighting::{
-    Catcher, Environment, Finish, Ground, Lighting, MAX_FINISHES, Model, Rough, TablePlace, Tables,
+    Catcher, Detail, Environment, Finish, Ground, Lighting, MAX_FINISHES, Model, Rough, TablePlace,
+    Tables,
 };
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,

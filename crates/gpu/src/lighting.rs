@@ -1,6 +1,9 @@
 //! What path tracing needs beside the spheres: environment, ground, materials, in plain values.
 
+use std::sync::Arc;
+
 use bytemuck::{Pod, Zeroable};
+use spherule_tracer::scene::environment::DetailMap;
 
 /// Maximum number of groups of spheres that reflect light in different ways.
 pub const MAX_FINISHES: usize = 65;
@@ -69,7 +72,7 @@ pub struct TablePlace {
 }
 
 /// Light from infinitely far away.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Environment {
     /// Unit vectors: right, back, up.
     pub axes: [[f32; 3]; 3],
@@ -77,8 +80,19 @@ pub struct Environment {
     pub table: TablePlace,
     /// The first pixel of the image, which has 512 columns and 256 rows.
     pub image: u32,
+    /// The image at its own resolution, which is seen instead.
+    pub detail: Option<Detail>,
     /// Irradiance in spherical harmonics.
     pub harmonics: [[f32; 3]; 9],
+}
+
+/// An image of an environment at its own resolution.
+#[derive(Debug, Clone)]
+pub struct Detail {
+    /// Its pixels.
+    pub map: Arc<DetailMap>,
+    /// A factor on their radiance, linear RGB.
+    pub scale: [f32; 3],
 }
 
 /// A plane that is visible from above.
@@ -160,9 +174,10 @@ pub(crate) struct SceneUniform {
     image: u32,
     is_environment_visible: u32,
     indirect_limit: f32,
-    zero: u32,
     finish_count: u32,
+    detail_scale: [f32; 3],
     is_ambient: u32,
+    detail_size: [u32; 2],
     zeros: [u32; 2],
     finishes: [FinishUniform; MAX_FINISHES],
     harmonics: [[f32; 4]; 9],
@@ -213,6 +228,11 @@ impl From<&Lighting> for SceneUniform {
             [uniform.axis_right, uniform.axis_back, uniform.axis_up] = environment.axes;
             uniform.environment = environment.table.into();
             uniform.image = environment.image;
+            if let Some(detail) = &environment.detail {
+                uniform.detail_size =
+                    detail.map.size().map(|side| u32::try_from(side).expect("below 2^32 pixels"));
+                uniform.detail_scale = detail.scale;
+            }
             uniform.harmonics = environment.harmonics.map(|[r, g, b]| [r, g, b, 0.0]);
         }
         if let Some(ground) = &lighting.ground {

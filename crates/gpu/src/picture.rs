@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use spherule_tracer::render::PathSeed;
 
-use crate::lighting::{Lighting, Model, source_count};
+use crate::lighting::{Detail, Lighting, Model, source_count};
 
 /// Largest number of lights.
 pub const MAX_LIGHTS: usize = 8;
@@ -38,6 +38,12 @@ impl Picture<'_> {
     /// Whether paths are traced.
     pub(crate) const fn has_paths(&self) -> bool {
         matches!(self.model, Model::Paths(_))
+    }
+
+    /// The image of the environment at its own resolution.
+    pub(crate) fn detail(&self) -> Option<&Detail> {
+        let Model::Paths(lighting) = self.model else { return None };
+        lighting.environment.as_ref()?.detail.as_ref()
     }
 
     /// Whether indirect light has a limit.

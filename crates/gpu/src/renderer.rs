@@ -127,6 +127,8 @@ struct Variant {
     has_opacity: bool,
     /// Whether indirect light has a limit.
     has_clamp: bool,
+    /// Whether the environment has an image at its own resolution.
+    has_detail: bool,
     /// Whether radii are equal.
     is_common: bool,
     /// Levels that the stack holds.
@@ -157,6 +159,7 @@ impl Kernels {
             &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * variant.levels),
             &format!("const HAS_OPACITY: bool = {};\n", variant.has_opacity),
             &format!("const HAS_CLAMP: bool = {};\n", variant.has_clamp),
+            &format!("const HAS_DETAIL: bool = {};\n", variant.has_detail),
             GROUPS,
             include_str!("shaders/view.wgsl"),
             include_str!("shaders/arithmetic.wgsl"),
@@ -174,8 +177,8 @@ impl Kernels {
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
             [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18],
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19],
                 &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18],
             ]
         } else {
@@ -238,12 +241,13 @@ struct TraceArrays {
     sums: Array,
     texels: Array,
     constants: Array,
-    /// The version of the tables that these two hold.
+    detail: Array,
+    /// The version of the tables that these three hold.
     tables: Option<u64>,
 }
 
 impl TraceArrays {
-    fn all(&self) -> [&Array; 12] {
+    fn all(&self) -> [&Array; 13] {
         let [rays, other_rays] = &self.rays;
         [
             &self.colors,
@@ -258,6 +262,7 @@ impl TraceArrays {
             &self.sums,
             &self.texels,
             &self.constants,
+            &self.detail,
         ]
     }
 
@@ -265,8 +270,21 @@ impl TraceArrays {
     fn write_tables(&mut self, device: &Device, lighting: &Lighting) -> Result<(), GpuError> {
         let tables = &lighting.tables;
         if self.tables != Some(tables.version) {
+            self.tables = None;
             self.texels.write(device, "environment", bytemuck::cast_slice(&tables.texels))?;
             self.constants.write(device, "tables", bytemuck::cast_slice(&tables.constants))?;
+            let detail = lighting.environment.as_ref().and_then(|of| of.detail.as_ref());
+            let halves = detail.map_or(&[][..], |detail| detail.map.bits());
+            // Copies are whole words
+            let padded: Vec<u16>;
+            let halves = if halves.len().is_multiple_of(2) {
+                halves
+            } else {
+                padded = [halves, &[0]].concat();
+                &padded
+            };
+            let what = "the pixels of the environment (environment.detail)";
+            self.detail.write(device, what, bytemuck::cast_slice(halves))?;
             self.tables = Some(tables.version);
         }
         Ok(())
@@ -357,6 +375,7 @@ impl Renderer {
             has_paths: picture.has_paths(),
             has_opacity: self.has_opacity,
             has_clamp: picture.has_clamp(),
+            has_detail: picture.detail().is_some(),
             is_common: shape.is_common,
             levels: shape.levels.max(MIN_STACK_LEVELS),
         };
@@ -592,6 +611,7 @@ impl Renderer {
             14 => &arrays.sums,
             16 => &arrays.texels,
             17 => &arrays.constants,
+            19 => &arrays.detail,
             _ => return self.tree.traversal_array(binding).expect("1 to 3 are those of the tree"),
         };
         array.binding()

@@ -52,8 +52,6 @@ pub enum Missing {
     Drawing,
     /// Particles that hide what is behind them.
     Holdout,
-    /// An image of the environment at its own resolution.
-    Detail,
     /// Metal or plastic that sees the environment through a shadow catcher.
     MirroredCatcher,
 }
@@ -72,7 +70,6 @@ impl fmt::Display for Missing {
             Self::Layers => "layers of light and Cryptomatte",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
-            Self::Detail => "an image of the environment at its own resolution",
             Self::MirroredCatcher => {
                 "metal and plastic above a shadow catcher without a background"
             }
@@ -101,7 +98,6 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (!are_from_nearest(&settings.channels), Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
-        (scene.environment.as_ref().is_some_and(|map| map.has_detail()), Missing::Detail),
         (mirrors_see_through(scene, settings) && !is_whitted, Missing::MirroredCatcher),
     ]
     .into_iter()

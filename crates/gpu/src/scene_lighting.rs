@@ -147,6 +147,9 @@ fn environment_of(environment: &scene::Environment, tables: &mut Tables) -> ligh
         axes: [axes.right, axes.back, axes.up].map(|axis| axis.to_array()),
         table,
         image,
+        detail: environment
+            .detail()
+            .map(|(map, scale)| lighting::Detail { map: Arc::clone(map), scale: scale.to_array() }),
         harmonics: environment.irradiance_harmonics().coefficients().map(|c| c.to_array()),
     }
 }

@@ -105,6 +105,7 @@ fn opacities_are_those_of_the_cpu() {
         small,
         Case { opacity: Some(Opacity::Each), is_mapped: true, is_studio: true, ..small },
         Case { opacity: Some(Opacity::Common(0.0)), ..small },
+        Case { opacity: Some(Opacity::Style(0.3)), ..small },
         Case { radii: Radii::Each, data: Data::Clusters, seed: 3, ..small },
         Case { data: Data::Coincident, particles: 50, ..small },
     ] {
@@ -112,7 +113,7 @@ fn opacities_are_those_of_the_cpu() {
     }
     for paths in [Paths::Matte, Paths::Metal, Paths::Catcher, Paths::Lights] {
         let case = Case { paths: Some(paths), particles: 400, samples: 5, ..small };
-        for opacity in [Opacity::Common(0.4), Opacity::Each] {
+        for opacity in [Opacity::Common(0.4), Opacity::Each, Opacity::Style(0.3)] {
             let case = Case { opacity: Some(opacity), ..case };
             let found = support::compare(&mut renderer, &case, level);
             let Difference { ids, depths, mean, bias, odd, ray_ratio, .. } = found;

@@ -10,9 +10,11 @@ use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
 use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{
     Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, Opacities,
-    ParticleShading, RayCounts, RenderSettings, render,
+    ParticleShading, RayCounts, RenderSettings, StyleShading, render,
 };
-use spherule_tracer::scene::environment::{self, Environment, EnvironmentAxes};
+use spherule_tracer::scene::environment::{
+    self, DetailMap, Environment, EnvironmentAxes, RadianceMap,
+};
 use spherule_tracer::scene::ground::{Ground, Pattern};
 use spherule_tracer::scene::{
     Background, Camera, CameraView, ColorMap, Finish, Lens, Light, LightKind, MaterialId,
@@ -57,6 +59,8 @@ pub(crate) enum Opacity {
     Common(f32),
     /// From 0 to 1, of some exactly that.
     Each,
+    /// Those of the second half, which are a style.
+    Style(f32),
 }
 
 /// What pictures of path tracing have beside the studio around the particles.
@@ -80,10 +84,12 @@ pub(crate) enum Paths {
     Ambient,
     /// A lens.
     Lens,
+    /// Smooth metal under an image of an odd size, which is seen at its own resolution.
+    Detail,
 }
 
 impl Paths {
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 10] = [
         Self::Matte,
         Self::Look,
         Self::Plastic,
@@ -93,6 +99,7 @@ impl Paths {
         Self::Lights,
         Self::Ambient,
         Self::Lens,
+        Self::Detail,
     ];
 }
 
@@ -299,6 +306,20 @@ pub(crate) fn scene(case: &Case, angle: f64) -> Scene {
     scene
 }
 
+/// An image with details that are smaller than the pixels of environments.
+fn detailed_map() -> RadianceMap {
+    let (width, height) = (1501, 751);
+    let pixel = |i: usize| {
+        let square = i % width / 3 + i / width / 3;
+        Vec3::new(
+            if square.is_multiple_of(2) { 1.5 } else { 0.1 },
+            0.5,
+            (i % width) as f32 / 1501.0,
+        )
+    };
+    RadianceMap::new(width, height, (0..width * height).map(pixel).collect()).expect("a valid size")
+}
+
 fn path_scene(paths: Paths, camera: Camera) -> Scene {
     let bounds =
         spherule_tracer::scene::Bounds { min: LOW.as_dvec3(), max: (LOW + SIZE).as_dvec3() };
@@ -310,14 +331,20 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
         Paths::Plastic => Some(Environment::from_fn(axes, |d| {
             0.5 + 0.5 * d + 20.0 * f32::from(d.x > 0.9) * Vec3::ONE
         })),
+        Paths::Detail => {
+            let detail = DetailMap::of(&detailed_map()).map(std::sync::Arc::new);
+            let environment = Environment::from_map(axes, &detailed_map(), Vec3::ONE);
+            Some(environment.with_detail(detail, Vec3::new(1.0, 0.9, 1.2)))
+        }
         _ => Some(environment::studio(axes, Vec3::ONE)),
     };
     scene.environment = environment.map(std::sync::Arc::new);
-    scene.is_environment_visible = paths == Paths::Plastic;
+    scene.is_environment_visible = matches!(paths, Paths::Plastic | Paths::Detail);
     scene.background = Background::Studio { up: Vec3::Z };
     let finish = match paths {
         Paths::Plastic => Finish::Plastic { roughness: 0.4 },
         Paths::Metal => Finish::Metal { roughness: 0.3 },
+        Paths::Detail => Finish::Metal { roughness: 0.05 },
         _ => Finish::Matte,
     };
     scene.materials[MaterialId::PARTICLES.index()].finish = finish;
@@ -396,7 +423,16 @@ fn shading<'a>(case: &Case, particles: &'a Particles, map: &'a ColorMap) -> Part
         opacities: match case.opacity {
             Some(Opacity::Common(opacity)) => Opacities::Constant(opacity),
             Some(Opacity::Each) => Opacities::Mapped { values, range: [0.2, 0.9] },
-            None => Opacities::Constant(1.0),
+            Some(Opacity::Style(_)) | None => Opacities::Constant(1.0),
+        },
+        styles: match case.opacity {
+            Some(Opacity::Style(opacity)) => vec![StyleShading {
+                first: u32::try_from(case.particles / 2).expect("few particles"),
+                material: MaterialId::PARTICLES,
+                colors: Colors::Constant(Vec3::new(0.9, 0.3, 0.2)),
+                opacities: Opacities::Constant(opacity),
+            }],
+            _ => Vec::new(),
         },
         ..ParticleShading::constant(color)
     }
