@@ -200,7 +200,6 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Layers => "output.channels",
         Missing::Drawing => "render.outline",
         Missing::Holdout => "mesh",
-        Missing::MirroredCatcher => "render.ground",
     }
 }
 
@@ -223,8 +222,7 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
         (true, true) => 12 * particles,
         (true, false) => 0,
     };
-    let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
-    let of_pixels = bytes_per_pixel(&picture.render, lights) * pixels;
+    let of_pixels = bytes_per_pixel(&picture.scene, &picture.render) * pixels;
     tree_bytes(particles, is_common) + colors + of_pixels + detail_bytes(setup)
 }
 

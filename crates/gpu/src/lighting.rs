@@ -17,14 +17,39 @@ pub enum Model<'a> {
     Paths(&'a Lighting),
 }
 
-/// Number of sources of shadow rays: the lights, and for paths the environment and their last segments.
-pub(crate) const fn source_count(has_paths: bool, lights: u32) -> u32 {
-    if has_paths { 2 + lights } else { lights }
+/// What the rays of a picture are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RayKinds {
+    /// Whether they are parts of paths.
+    pub(crate) has_paths: bool,
+    /// Whether mirrors see the environment through a shadow catcher.
+    pub(crate) has_mirrors: bool,
+    /// Number of lights.
+    pub(crate) lights: u32,
 }
 
-/// Memory of a ray that goes on, and of a shadow ray, bytes.
-pub(crate) const fn ray_bytes(has_paths: bool) -> u64 {
-    if has_paths { 48 } else { 32 }
+impl RayKinds {
+    /// The first light among the sources of shadow rays: those of paths begin with the environment and their last
+    /// segments.
+    pub(crate) const fn first_light(self) -> u32 {
+        if self.has_paths { 2 } else { 0 }
+    }
+
+    /// Number of sources of shadow rays. If there are mirrors, the environment and the lights of a catcher follow.
+    pub(crate) const fn sources(self) -> u32 {
+        let of_catcher = if self.has_mirrors { 1 + self.lights } else { 0 };
+        self.first_light() + self.lights + of_catcher
+    }
+
+    /// Memory of a ray that goes on, bytes.
+    pub(crate) const fn ray_bytes(self) -> u64 {
+        self.shadow_bytes() + if self.has_mirrors { 16 } else { 0 }
+    }
+
+    /// Memory of a shadow ray, bytes.
+    pub(crate) const fn shadow_bytes(self) -> u64 {
+        if self.has_paths { 48 } else { 32 }
+    }
 }
 
 /// The scene of path tracing.
@@ -36,6 +61,8 @@ pub struct Lighting {
     pub ambient_reach: Option<f32>,
     /// The limit of indirect light: the largest component that a ray may add to its sample.
     pub indirect_limit: Option<f32>,
+    /// Whether metal and plastic see the environment through a shadow catcher.
+    pub has_mirrors: bool,
     /// The environment; None if it is black.
     pub environment: Option<Environment>,
     /// Whether camera rays see it instead of the background.

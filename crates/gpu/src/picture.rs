@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use spherule_tracer::render::PathSeed;
 
-use crate::lighting::{Detail, Lighting, Model, source_count};
+use crate::lighting::{Detail, Lighting, Model, RayKinds};
 
 /// Largest number of lights.
 pub const MAX_LIGHTS: usize = 8;
@@ -51,10 +51,18 @@ impl Picture<'_> {
         matches!(self.model, Model::Paths(Lighting { indirect_limit: Some(_), .. }))
     }
 
+    /// What its rays are.
+    pub(crate) fn ray_kinds(&self) -> RayKinds {
+        RayKinds {
+            has_paths: self.has_paths(),
+            has_mirrors: matches!(self.model, Model::Paths(Lighting { has_mirrors: true, .. })),
+            lights: u32::try_from(self.lights.len()).expect("at most MAX_LIGHTS"),
+        }
+    }
+
     /// Number of sources of shadow rays.
     pub(crate) fn sources(&self) -> u32 {
-        let lights = u32::try_from(self.lights.len()).expect("at most MAX_LIGHTS");
-        source_count(self.has_paths(), lights)
+        self.ray_kinds().sources()
     }
 
     /// Whether rays can hit a light.

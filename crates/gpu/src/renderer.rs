@@ -4,12 +4,14 @@
 use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
+use spherule_tracer::render::device::mirrors_see_through;
 use spherule_tracer::render::{IntegratorKind, RenderSettings};
+use spherule_tracer::scene::Scene;
 use wgpu::BindingResource;
 
 use crate::arrays::{Array, Download, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel, Timer};
-use crate::lighting::{Lighting, Model, SceneUniform, ray_bytes, source_count};
+use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
 use crate::picture::{FilmSize, Picture, Samples, View};
 use crate::tree::{GROUPS, Spheres, TreeBuilder, TreeShape, tree_constants};
 use crate::{Device, GpuError};
@@ -129,6 +131,8 @@ struct Variant {
     has_clamp: bool,
     /// Whether the environment has an image at its own resolution.
     has_detail: bool,
+    /// Whether mirrors see the environment through a shadow catcher.
+    has_mirrors: bool,
     /// Whether radii are equal.
     is_common: bool,
     /// Levels that the stack holds.
@@ -160,6 +164,7 @@ impl Kernels {
             &format!("const HAS_OPACITY: bool = {};\n", variant.has_opacity),
             &format!("const HAS_CLAMP: bool = {};\n", variant.has_clamp),
             &format!("const HAS_DETAIL: bool = {};\n", variant.has_detail),
+            &format!("const HAS_MIRRORS: bool = {};\n", variant.has_mirrors),
             GROUPS,
             include_str!("shaders/view.wgsl"),
             include_str!("shaders/arithmetic.wgsl"),
@@ -296,11 +301,16 @@ const fn film_bytes(has_odd: bool, has_clamp: bool) -> u64 {
     16 * (1 + has_odd as u64 + has_clamp as u64)
 }
 
-/// Memory of the device for the film and the queues of each pixel with that many lights, bytes.
-pub fn bytes_per_pixel(settings: &RenderSettings, lights: u32) -> u64 {
+/// Memory of the device for the film and the queues of each pixel, bytes.
+pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
     let has_paths = settings.integrator == IntegratorKind::Path;
+    let rays = RayKinds {
+        has_paths,
+        has_mirrors: has_paths && mirrors_see_through(scene, settings),
+        lights: u32::try_from(scene.lights.len()).unwrap_or(u32::MAX),
+    };
     let film = film_bytes(settings.has_features, has_paths && settings.clamp.is_some());
-    4 + film + 32 + ray_bytes(has_paths) * (2 + u64::from(source_count(has_paths, lights)))
+    4 + film + 32 + 2 * rays.ray_bytes() + rays.shadow_bytes() * u64::from(rays.sources())
 }
 
 impl Renderer {
@@ -376,6 +386,7 @@ impl Renderer {
             has_opacity: self.has_opacity,
             has_clamp: picture.has_clamp(),
             has_detail: picture.detail().is_some(),
+            has_mirrors: picture.ray_kinds().has_mirrors,
             is_common: shape.is_common,
             levels: shape.levels.max(MIN_STACK_LEVELS),
         };
@@ -474,17 +485,17 @@ impl Renderer {
 
     fn reserve(&mut self, device: &Device, picture: &Picture<'_>) -> Result<(), GpuError> {
         let pixels = picture.film.pixels();
-        let sources = picture.sources();
+        let rays = picture.ray_kinds();
         let film = film_bytes(picture.has_odd, picture.has_clamp());
-        let ray = ray_bytes(picture.has_paths());
         let counters = vec![0; counter_count(picture) as usize];
         let arrays = &mut self.arrays;
         arrays.film.reserve(device, "pixels", film * pixels)?;
         arrays.data.reserve(device, "pixels", 32 * pixels)?;
         for queue in &mut arrays.rays {
-            queue.reserve(device, "rays", ray * pixels)?;
+            queue.reserve(device, "rays", rays.ray_bytes() * pixels)?;
         }
-        arrays.shadows.reserve(device, "shadow rays", ray * pixels * u64::from(sources))?;
+        let shadows = rays.shadow_bytes() * u64::from(rays.sources());
+        arrays.shadows.reserve(device, "shadow rays", shadows * pixels)?;
         if let Model::Paths(lighting) = picture.model {
             arrays.write_tables(device, lighting)?;
         }
@@ -634,10 +645,16 @@ fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
         Model::Whitted => None,
         Model::Paths(lighting) => Some(lighting),
     };
-    // The lights are the last sources
-    let first = source_count(picture.has_paths(), 0);
-    match (source.checked_sub(first), scene) {
-        (Some(light), _) => picture.lights[light as usize].casts_shadow,
+    // The lights follow, then the environment and the lights of a catcher
+    let rays = picture.ray_kinds();
+    let lights = picture.lights;
+    match (source.checked_sub(rays.first_light()), scene) {
+        (Some(light), _) if light < rays.lights => lights[light as usize].casts_shadow,
+        (Some(light), Some(scene)) => match light - rays.lights {
+            0 => scene.environment.is_some(),
+            light => lights[light as usize - 1].casts_shadow,
+        },
+        (Some(_), None) => false,
         (None, Some(scene)) if scene.environment.is_none() => false,
         (None, Some(scene)) if source == 1 => depth > scene.bounces && !picture.has_extents(),
         (None, _) => true,

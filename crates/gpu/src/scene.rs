@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
-    DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, mirrors_see_through, store_pixels,
+    DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, store_pixels,
 };
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
@@ -52,8 +52,6 @@ pub enum Missing {
     Drawing,
     /// Particles that hide what is behind them.
     Holdout,
-    /// Metal or plastic that sees the environment through a shadow catcher.
-    MirroredCatcher,
 }
 
 impl fmt::Display for Missing {
@@ -70,9 +68,6 @@ impl fmt::Display for Missing {
             Self::Layers => "layers of light and Cryptomatte",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
-            Self::MirroredCatcher => {
-                "metal and plastic above a shadow catcher without a background"
-            }
         })
     }
 }
@@ -98,7 +93,6 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (!are_from_nearest(&settings.channels), Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
-        (mirrors_see_through(scene, settings) && !is_whitted, Missing::MirroredCatcher),
     ]
     .into_iter()
     .find_map(|(is_needed, missing)| is_needed.then_some(missing))

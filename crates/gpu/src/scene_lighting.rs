@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use spherule_tracer::render::device::{ambient_reach, light_on, reflected_by_white, rough_table};
+use spherule_tracer::render::device::{
+    ambient_reach, light_on, mirrors_see_through, reflected_by_white, rough_table,
+};
 use spherule_tracer::render::{IndirectLight, RenderSettings, ShadeSource};
 use spherule_tracer::scene::ground::Pattern;
 use spherule_tracer::scene::{self, Finish, Scene, environment::TableArrays};
@@ -73,6 +75,7 @@ impl SceneLighting {
         lighting.is_environment_visible = scene.is_environment_visible;
         lighting.bounces = settings.traced_bounces();
         lighting.indirect_limit = settings.clamp;
+        lighting.has_mirrors = mirrors_see_through(scene, settings);
         lighting.ambient_reach = match settings.indirect {
             IndirectLight::Traced => None,
             IndirectLight::Ambient { radius } => Some(ambient_reach(radius)),
@@ -103,6 +106,7 @@ fn prepared(key: &Key) -> Lighting {
         bounces: 0,
         ambient_reach: None,
         indirect_limit: None,
+        has_mirrors: false,
         is_environment_visible: false,
         tables,
     }

@@ -129,7 +129,7 @@ fn indirect_light_has_the_limit_of_the_cpu() {
     let Some(device) = device(Checks::On) else { return };
     let level = same_arithmetic(&device);
     let mut renderer = SceneRenderer::new(Arc::new(device));
-    for paths in [Paths::Plastic, Paths::Metal, Paths::Catcher, Paths::Lights, Paths::Ambient] {
+    for paths in [Paths::Plastic, Paths::Mirrors, Paths::Coats, Paths::Lights, Paths::Ambient] {
         let clamp = Some(0.1);
         let case = Case { paths: Some(paths), samples: 5, particles: 400, clamp, ..Case::small() };
         let found = support::compare(&mut renderer, &case, level);

@@ -84,12 +84,16 @@ pub(crate) enum Paths {
     Ambient,
     /// A lens.
     Lens,
+    /// Metal and plastic ones, which see the environment through a shadow catcher, before it or on a transparent
+    /// background.
+    Mirrors,
+    Coats,
     /// Smooth metal under an image of an odd size, which is seen at its own resolution.
     Detail,
 }
 
 impl Paths {
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Matte,
         Self::Look,
         Self::Plastic,
@@ -99,6 +103,8 @@ impl Paths {
         Self::Lights,
         Self::Ambient,
         Self::Lens,
+        Self::Mirrors,
+        Self::Coats,
         Self::Detail,
     ];
 }
@@ -178,7 +184,7 @@ impl Case {
                 IndirectLight::Traced
             },
             has_features: self.paths.is_some(),
-            transparent_background: self.paths == Some(Paths::Catcher),
+            transparent_background: matches!(self.paths, Some(Paths::Catcher | Paths::Coats)),
             samples: self.samples,
             seed: self.seed,
             max_depth: self.max_depth,
@@ -339,11 +345,11 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
         _ => Some(environment::studio(axes, Vec3::ONE)),
     };
     scene.environment = environment.map(std::sync::Arc::new);
-    scene.is_environment_visible = matches!(paths, Paths::Plastic | Paths::Detail);
+    scene.is_environment_visible = matches!(paths, Paths::Plastic | Paths::Mirrors | Paths::Detail);
     scene.background = Background::Studio { up: Vec3::Z };
     let finish = match paths {
-        Paths::Plastic => Finish::Plastic { roughness: 0.4 },
-        Paths::Metal => Finish::Metal { roughness: 0.3 },
+        Paths::Plastic | Paths::Coats => Finish::Plastic { roughness: 0.4 },
+        Paths::Metal | Paths::Mirrors => Finish::Metal { roughness: 0.3 },
         Paths::Detail => Finish::Metal { roughness: 0.05 },
         _ => Finish::Matte,
     };
@@ -357,7 +363,7 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
             scene.ground =
                 Some(Ground { pattern: checker, fade_start: 1.0, fade_end: 3.0, ..ground });
         }
-        Paths::Look | Paths::Catcher | Paths::Backdrop => {
+        Paths::Look | Paths::Catcher | Paths::Backdrop | Paths::Mirrors | Paths::Coats => {
             scene.ground = Some(ground.into_shadow_catcher(0.8))
         }
         Paths::Lights => {
@@ -374,7 +380,7 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
         }
         _ => {}
     }
-    if paths == Paths::Catcher {
+    if matches!(paths, Paths::Catcher | Paths::Mirrors | Paths::Coats) {
         let to_light = Vec3::new(-0.4, -0.3, 0.8).normalize();
         let kind = LightKind::Sun { to_light, half_angle: 0.02 };
         scene.lights.push(light(kind, Vec3::splat(2.0)));

@@ -4,13 +4,14 @@
 // heuristic, and each light is sampled. The path goes on in the direction of the BSDF; from the third reflection on it
 // ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights.
 //
-// A ray that goes on has its direction and density, and its throughput beside its origin. A shadow ray has its direction
+// A ray that goes on has its direction and density, and its throughput beside its origin, and the diffuse part of that
+// if mirrors see the environment through a shadow catcher (HAS_MIRRORS). A shadow ray has its direction
 // and length, and its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage.
 
-const RAY: u32 = 3u;
+const RAY: u32 = select(3u, 4u, HAS_MIRRORS);
 const SHADOW: u32 = 3u;
 
-// Sources of shadow rays; those of the lights follow
+// Sources of shadow rays; those of the lights follow, then those of a catcher that mirrors see
 const OF_ENVIRONMENT: u32 = 0u;
 const OF_LAST: u32 = 1u;
 const FIRST_LIGHT: u32 = 2u;
@@ -31,8 +32,8 @@ const MAX_LOST: f32 = 1.8e19;
 
 const LUMINANCE: vec3<f32> = vec3<f32>(0.2126, 0.7152, 0.0722);
 
-// A path up to a ray
-struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32> }
+// A path up to a ray. `diffuse` is the part of its throughput from the diffuse reflection before.
+struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32>, diffuse: vec3<f32> }
 
 // A point of an opaque surface
 struct Vertex { normal: vec3<f32>, start: vec3<f32>, base: vec3<f32>, out: vec3<f32>, finish: Finish }
@@ -104,10 +105,20 @@ fn seen_behind(ray: Ray, on_film: vec2<f32>) -> vec3<f32> {
   return environment_along(ray.direction, FAR);
 }
 
-// The shadow rays of a shadow catcher: what is blocked darkens the background by its part of the whole light.
-fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed: Wide) {
+// The source of the shadow rays of a catcher to the environment (0) and to lights (from 1 on). A glossy reflection of a
+// catcher needs its own, because its diffuse part is shaded, too.
+fn catcher_source(number: u32) -> u32 {
+  if (HAS_MIRRORS) { return FIRST_LIGHT + view.light_count + number; }
+  return select(FIRST_LIGHT + number - 1u, OF_ENVIRONMENT, number == 0u);
+}
+
+// The shadow rays of a shadow catcher: what is blocked darkens what is `behind` by its part of the whole light, and by
+// `darkness` at most.
+fn catch_shadows(
+  is_caught: bool, ground: GroundHit, ray: Ray, behind: vec3<f32>, darkness: f32, pixel: u32, seed: Wide,
+) {
   let white = Vertex(scene.ground_up, above_ground(ground), vec3<f32>(1.0), -ray.direction, OF_GROUND);
-  let darkness = scene.catcher_strength * ground.opacity;
+  let covers = select(vec3<f32>(0.0), LUMINANCE, stage.depth == 1u);
   // The light that arrives if nothing is in the way
   var whole = scene.catcher_whole;
   if (is_caught) {
@@ -115,7 +126,6 @@ fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed:
       whole += reflected(white, vec3<f32>(1.0), sample_source(number, white, seed), false);
     }
   }
-  let behind = seen_behind(ray, path.on_film);
   let part = select(vec3<f32>(0.0), darkness / whole, whole > vec3<f32>(0.0));
   // A ray to each source
   var shadow = no_shadow();
@@ -123,18 +133,18 @@ fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed:
     let sample = sample_table(scene.catcher, numbers_2d(seed, ENVIRONMENT, current.sample));
     let lost = sample.radiance * (INVERSE_PI / sample.pdf) * part;
     let is_above = dot(sample.direction, white.normal) > 0.0;
-    shadow = Shadow(is_above, white.start, sample.direction, FAR, -lost * behind, dot(lost, LUMINANCE));
+    shadow = Shadow(is_above, white.start, sample.direction, FAR, -lost * behind, dot(lost, covers));
   }
-  push_shadow(OF_ENVIRONMENT, shadow, path.pixel);
+  push_shadow(catcher_source(0u), shadow, pixel);
   for (var number = 0u; number < view.light_count; number++) {
     shadow = no_shadow();
     if (is_caught && view.lights[number].casts_shadow == 1u) {
       let light = sample_source(number, white, seed);
       let lost = reflected(white, vec3<f32>(1.0), light, false) * part;
       let is_needed = largest_of(lost) > 0.0;
-      shadow = Shadow(is_needed, white.start, light.direction, light.distance, -lost * behind, dot(lost, LUMINANCE));
+      shadow = Shadow(is_needed, white.start, light.direction, light.distance, -lost * behind, dot(lost, covers));
     }
-    push_shadow(FIRST_LIGHT + number, shadow, path.pixel);
+    push_shadow(catcher_source(1u + number), shadow, pixel);
   }
 }
 
@@ -205,11 +215,19 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
       sum += vec4<f32>(uncovered * path.throughput * environment_along(ray.direction, pdf), 0.0);
     }
   }
+  // A glossy reflection sees the environment through a catcher
+  var weight = path.throughput;
+  var behind = vec3<f32>(0.0);
+  let is_passed = HAS_MIRRORS && is_ground && !is_first && any(path.diffuse != vec3<f32>(1.0));
+  if (is_passed) {
+    behind = ground.opacity * weight * (1.0 - path.diffuse) * environment_along(ray.direction, FAR);
+    sum += vec4<f32>(behind, 0.0);
+    weight *= path.diffuse;
+  }
   // The first surface reflects this light, which has no limit
   let direct = select(vec4<f32>(0.0), sum, stage.depth == 2u);
   // The point of the surface
   var vertex: Vertex;
-  var weight = path.throughput;
   if (is_sphere) {
     let surface = surface_at(ray, hit);
     vertex = Vertex(surface.normal, surface.start, base_color(hit.index), -ray.direction, finish_of(hit.index));
@@ -225,8 +243,13 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   if (is_first && (is_sphere || (is_ground && !is_caught))) {
     sum.w += select(1.0, ground.opacity, view.transparent == 1u && is_ground);
   }
-  if (is_first && scene.is_catcher == 1u) { catch_shadows(is_caught, ground, ray, path, seed); }
-  var is_shaded = (is_sphere || is_ground) && !is_caught && bounces <= scene.bounces;
+  if (scene.is_catcher == 1u && (is_first || HAS_MIRRORS)) {
+    if (is_first) { behind = seen_behind(ray, path.on_film); }
+    let darkness = scene.catcher_strength * select(1.0, ground.opacity, is_first);
+    catch_shadows(is_caught || is_passed, ground, ray, behind, darkness, path.pixel, seed);
+  }
+  let is_mirror = is_passed && largest_of(path.diffuse) == 0.0;
+  var is_shaded = (is_sphere || is_ground) && !is_caught && !is_mirror && bounces <= scene.bounces;
   if (is_shaded && scene.is_ambient == 1u && bounces > 0u) {
     sum += vec4<f32>(ambient_light(vertex, weight, t, seed), 0.0);
     is_shaded = false;
@@ -275,6 +298,10 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     next_rays[RAY * place] = vec4<f32>(vertex.start, bitcast<f32>(path.pixel));
     next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
+    if (HAS_MIRRORS) {
+      let diffuse = diffuse_fraction(vertex.finish, vertex.base, vertex.normal, vertex.out, next.direction);
+      next_rays[RAY * place + 3u] = vec4<f32>(diffuse, 0.0);
+    }
   }
   if (is_ray) { add_light(path.pixel, sum, direct); }
 }
@@ -284,7 +311,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
 fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
   let is_ray = id.x < view.width && id.y < view.height;
   let pixel = id.y * view.width + id.x;
-  var path = Path(vec3<f32>(1.0), FAR, pixel, vec2<f32>(0.0));
+  var path = Path(vec3<f32>(1.0), FAR, pixel, vec2<f32>(0.0), vec3<f32>(1.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
@@ -311,7 +338,7 @@ fn trace_next(
 ) {
   let i = linear_index(group, groups, local, GROUP);
   let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
-  var path = Path(vec3<f32>(0.0), FAR, 0u, vec2<f32>(0.0));
+  var path = Path(vec3<f32>(0.0), FAR, 0u, vec2<f32>(0.0), vec3<f32>(1.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
@@ -319,7 +346,8 @@ fn trace_next(
     let origin = rays[RAY * i];
     let direction = rays[RAY * i + 1u];
     ray = Ray(origin.xyz, direction.xyz);
-    path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0));
+    path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0), vec3<f32>(1.0));
+    if (HAS_MIRRORS) { path.diffuse = rays[RAY * i + 3u].xyz; }
     ground = hit_ground(ray);
     hit = nearest(ray, ground.t, number_of_end(path.pixel, BOUNCED));
   }
@@ -347,7 +375,8 @@ fn trace_shadow(
   if (part == 0.0) { return; }
   let coverage = part * select(0.0, light.w, !adds && view.transparent == 1u);
   let pixel = bitcast<u32>(start.w);
-  if (HAS_CLAMP && stage.depth > 1u) {
+  // What the first surface reflects of a catcher has no limit
+  if (HAS_CLAMP && stage.depth > select(2u, 1u, adds)) {
     film[indirect_place(pixel)] += vec4<f32>(part * light.xyz, 0.0);
   } else {
     add_to_film(pixel, vec4<f32>(part * light.xyz, coverage));
