@@ -88,10 +88,10 @@ fn no_device(adapters: &[AdapterSummary]) -> TraceError {
 fn failed(error: GpuError) -> TraceError {
     match error {
         GpuError::Interrupted => TraceError::Render(RenderError::Interrupted),
-        GpuError::Lost(_) => {
-            // The next frame opens a new device
+        GpuError::Lost { .. } => {
+            // The next frame opens it again
             *lock(&DEVICE) = None;
-            TraceError::Device(error.to_string())
+            TraceError::Device(format!("{error}; run the command again to render the frame"))
         }
         _ => TraceError::Device(error.to_string()),
     }
@@ -246,12 +246,7 @@ impl FrameRenderer for GpuRenderer {
         };
         report.seconds.read = frame.read_time.as_secs_f64();
         let start = Instant::now();
-        let renderer = self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let renderer = match renderer {
-            Some(renderer) => renderer,
-            None => renderer.insert(SceneRenderer::new(device()?)),
-        };
-        let particles = upload(renderer, setup, frame.particles)?;
+        let particles = upload(self.ready()?, setup, frame.particles)?;
         report.seconds.build = start.elapsed().as_secs_f64();
         report.bytes.attributes = match &particles {
             BuiltParticles::Decoded(shading) => shading.byte_len(),
@@ -282,7 +277,9 @@ impl FrameRenderer for GpuRenderer {
         let memory = MemoryUse::now();
         let mut report = frame.report.clone();
         report.seconds.trace = start.elapsed().as_secs_f64();
-        report.rays = ray_counts(&cost).into();
+        let rays = ray_counts(&cost);
+        report.clamped_light = rays.lost.part(&film.color, setup.picture.render.samples);
+        report.rays = rays.into();
         report.build = BuildSummary {
             structure: "lbvh".to_owned(),
             order: "hilbert".to_owned(),
@@ -343,6 +340,14 @@ fn upload(
 }
 
 impl GpuRenderer {
+    /// The renderer of the shared device. A device that was lost is opened again.
+    fn ready(&mut self) -> Result<&mut SceneRenderer, TraceError> {
+        let device = device()?;
+        let kept = self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let current = kept.take().filter(|of| std::ptr::eq(of.device(), &*device));
+        Ok(kept.insert(current.unwrap_or_else(|| SceneRenderer::new(device))))
+    }
+
     fn draw(
         &self,
         setup: &Setup,
@@ -380,5 +385,47 @@ impl GpuRenderer {
             trace: cost.trace_seconds,
             bytes: cost.bytes,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::accel::{SphereRadius, Spheres};
+    use crate::render::ParticleShading;
+    use crate::scene::{Camera, CameraView, Scene};
+
+    #[test]
+    fn a_lost_device_is_opened_again() {
+        if spherule_gpu::adapters().is_empty() && std::env::var_os("SPHERULE_GPU").is_none() {
+            return;
+        }
+        choose(0);
+        let mut renderer = GpuRenderer::default();
+        let spheres = Spheres { centers: &[Vec3::ZERO], radius: SphereRadius::Common(1.0) };
+        let view =
+            CameraView { eye: DVec3::X * 5.0, look_at: DVec3::ZERO, up: DVec3::Z, fov: 45.0 };
+        let scene = Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap());
+        let integrator = IntegratorKind::Whitted;
+        let settings = RenderSettings { integrator, ..RenderSettings::new(8, 8) };
+        let mut render = || {
+            let shading = ParticleShading::constant(Vec3::ONE);
+            let (mut film, never) = (Film::default(), AtomicBool::new(false));
+            let renderer = renderer.ready()?;
+            renderer.prepare(&spheres, &shading).map_err(failed)?;
+            let rendered = renderer.render_into(&mut film, &scene, &shading, &settings, &never);
+            rendered.map_err(scene_failed).map(|_| film.color)
+        };
+        let first = render().unwrap();
+        let device = device().unwrap();
+        device.destroy();
+        let error = render().unwrap_err().to_string();
+        assert!(error.contains(&device.adapter().name), "{error}");
+        assert!(error.ends_with("run the command again to render the frame"), "{error}");
+        assert!(render().unwrap() == first);
     }
 }

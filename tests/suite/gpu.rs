@@ -91,6 +91,24 @@ mod on_a_device {
         assert_equal(&workshop, ["gpu", "cpu"]);
     }
 
+    /// The part of the light that `render.clamp` takes away.
+    #[test]
+    fn limited_light_is_reported() {
+        let Some(workshop) = workshop_with_device() else { return };
+        let clamped_light = |out: &str, device: &[&str]| {
+            let limited = ["--set=render.clamp=0.05", "--set=output.preview=false"];
+            workshop.render_to(out, &[&limited[..], device].concat()).expect(0);
+            let report = std::fs::read_to_string(workshop.join(&format!("{out}/report.json")));
+            let report = report.expect("a report");
+            let (_, rest) = report.split_once("\"clamped_light\":").expect("a number");
+            let number: String = rest.chars().take_while(|c| !matches!(c, ',' | '}')).collect();
+            number.trim().parse::<f64>().expect("a number")
+        };
+        let gpu = clamped_light("gpu", &DEVICE);
+        let cpu = clamped_light("cpu", &["--device=cpu"]);
+        assert!(cpu > 1e-3 && (gpu / cpu - 1.0).abs() < 0.02, "{gpu} {cpu}");
+    }
+
     #[test]
     fn styles_of_spheres_are_those_of_the_cpu() {
         let Some(workshop) = workshop_with_device() else { return };

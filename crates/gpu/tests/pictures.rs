@@ -7,8 +7,10 @@
 mod support;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
+use spherule_tracer::render::Stop;
 use spherule_tree::math::SimdLevel;
 use support::{Case, Data, Difference, Opacity, Paths, Radii};
 
@@ -178,8 +180,39 @@ fn more_than_an_array_holds_is_refused() {
 fn a_raised_flag_stops_a_picture() {
     let Some(device) = device(Checks::Off) else { return };
     let mut renderer = SceneRenderer::new(Arc::new(device));
-    let error = support::stopped(&mut renderer, &Case::small()).unwrap_err();
+    let error =
+        support::stopped(&mut renderer, &Case::small(), &AtomicBool::new(true)).unwrap_err();
     assert_eq!(error.to_string(), "interrupted");
+}
+
+/// Loses the device when it is asked for the second time, in the middle of a picture.
+struct Loss(Arc<Device>, AtomicU32);
+
+impl Stop for Loss {
+    fn is_raised(&self) -> bool {
+        if self.1.fetch_add(1, Ordering::Relaxed) == 1 {
+            self.0.destroy();
+        }
+        false
+    }
+}
+
+#[test]
+fn a_lost_device_fails_pictures() {
+    let Some(device) = device(Checks::Off) else { return };
+    let device = Arc::new(device);
+    let mut renderer = SceneRenderer::new(Arc::clone(&device));
+    let case = Case { samples: 4, ..Case::small() };
+    let loss = Loss(Arc::clone(&device), AtomicU32::new(0));
+    let expected = format!("{} was lost: ", device.adapter().name);
+    // It stays lost: also the next picture fails, and so does the first one of another renderer
+    for _ in 0..2 {
+        let error = support::stopped(&mut renderer, &case, &loss).unwrap_err().to_string();
+        assert!(error.starts_with(&expected), "{error}");
+    }
+    let mut renderer = SceneRenderer::new(Arc::clone(&device));
+    let error = support::stopped(&mut renderer, &case, &loss).unwrap_err().to_string();
+    assert!(error.starts_with(&expected), "{error}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
 use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{
     Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, Opacities,
-    ParticleShading, RayCounts, RenderSettings, StyleShading, render,
+    ParticleShading, RayCounts, RenderSettings, Stop, StyleShading, render,
 };
 use spherule_tracer::scene::environment::{
     self, DetailMap, Environment, EnvironmentAxes, RadianceMap,
@@ -476,14 +476,17 @@ pub(crate) fn film_of(
     (film, cost)
 }
 
-/// A picture that is stopped from the start.
-pub(crate) fn stopped(renderer: &mut SceneRenderer, case: &Case) -> Result<Cost, SceneError> {
+/// A picture that `stop` may stop.
+pub(crate) fn stopped(
+    renderer: &mut SceneRenderer,
+    case: &Case,
+    stop: &dyn Stop,
+) -> Result<Cost, SceneError> {
     let (particles, map) = (Particles::new(case), color_map());
     let shading = shading(case, &particles, &map);
     renderer.prepare(&particles.spheres(), &shading)?;
-    let raised = AtomicBool::new(true);
     let mut film = Film::default();
-    renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), &raised)
+    renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), stop)
 }
 
 /// The film of the CPU, traced with the kernels of `level`.
