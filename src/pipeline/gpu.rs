@@ -15,6 +15,7 @@ use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, Tra
 use super::setup::{OpacityRule, ParticleStyle, RadiusRule, Setup, StyleForm};
 use super::shading::particle_shading;
 use super::surface::spheres;
+use super::trace::matte_attributes;
 use crate::render::{
     Film, IntegratorKind, RayCounts, RenderError, RenderSettings, ShadeSource, Stop,
 };
@@ -291,7 +292,7 @@ impl FrameRenderer for GpuRenderer {
             camera: setup.camera_at(frame.task.frame)?,
             task: frame.task.clone(),
             film,
-            texts: Vec::new(),
+            texts: matte_attributes(setup, frame),
             facts: frame.facts.clone(),
             time: frame.time,
             report,

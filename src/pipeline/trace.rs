@@ -191,7 +191,7 @@ impl CpuRenderer {
 }
 
 /// The attributes of the Cryptomatte layers of `frame`.
-fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
+pub(super) fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
     if setup.picture.render.channels.mattes().next().is_none() {
         return Vec::new();
     }

@@ -118,7 +118,7 @@ mod on_a_device {
             "x > 1: spheres, radius 0.03, color gold, material { type = \"metal\", roughness = 0.3 }",
             "--style",
             "x > 0.5: spheres, color red, material { type = \"plastic\" }",
-            "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\"]",
+            "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\", \"cryptomatte\"]",
         ];
         for (number, look) in [&whitted[..], &paths].into_iter().enumerate() {
             let [gpu, cpu] = ["gpu", "cpu"].map(|device| format!("{device}{number}"));
@@ -126,6 +126,11 @@ mod on_a_device {
                 workshop.render_to(out, &[look, device].concat()).expect(0);
             }
             assert_equal(&workshop, [&gpu, &cpu]);
+        }
+        // The names of objects are in the header
+        for out in ["gpu1", "cpu1"] {
+            let file = std::fs::read(workshop.join(format!("{out}/f.0001.exr"))).expect("a file");
+            assert!(file.windows(8).any(|text| text == b"\"style1\""), "{out}");
         }
         let refused = [&DEVICE[..], &["--style", "x > 0.5: union"]].concat();
         workshop

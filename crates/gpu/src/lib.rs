@@ -41,6 +41,7 @@
 //!     film,
 //!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128], seed: 0 },
 //!     has_odd: false,
+//!     has_objects: false,
 //!     model: Model::Whitted,
 //!     max_depth: 1,
 //!     background: Background::Constant([0.0; 3]),
@@ -96,7 +97,7 @@ pub use lighting::{
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-pub use renderer::{Colors, Cost, NearestSample, Pixels, Renderer, bytes_per_pixel};
+pub use renderer::{Colors, Cost, NearestSample, Pixels, Renderer, SampleObject, bytes_per_pixel};
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use tree::{
     Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, spheres_within, tree_bytes,

@@ -20,6 +20,8 @@ pub struct Picture<'a> {
     pub samples: Samples<'a>,
     /// Whether the sums over every second sample are kept, for denoising.
     pub has_odd: bool,
+    /// Whether the first surface of each sample is kept, for Cryptomatte.
+    pub has_objects: bool,
     /// The transport of light.
     pub model: Model<'a>,
     /// Whitted's model: recursion depth; 1 is direct light only. Rays beyond see the background.

@@ -47,6 +47,25 @@ pub struct Pixels<'a> {
     pub odd: &'a [[f32; 4]],
     /// The nearest sample.
     pub nearest: &'a [NearestSample],
+    /// The first surface of each sample, pixel by pixel, if the picture has them; else empty.
+    pub objects: &'a [SampleObject],
+}
+
+/// The first surface of a sample, in one word.
+#[repr(transparent)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct SampleObject(u32);
+
+impl SampleObject {
+    /// The index of its sphere, or None on the ground, with its coverage; None without a surface.
+    pub fn surface(self) -> Option<(Option<u32>, f32)> {
+        // Indices are below 2^31; the ground is its negative coverage
+        match self.0 {
+            NearestSample::NONE => None,
+            index if index >> 31 == 0 => Some((Some(index), 1.0)),
+            bits => Some((None, -f32::from_bits(bits))),
+        }
+    }
 }
 
 /// The nearest intersection of a pixel.
@@ -133,6 +152,8 @@ struct Variant {
     has_detail: bool,
     /// Whether mirrors see the environment through a shadow catcher.
     has_mirrors: bool,
+    /// Whether the first surfaces of samples are kept.
+    has_objects: bool,
     /// Whether radii are equal.
     is_common: bool,
     /// Levels that the stack holds.
@@ -165,6 +186,7 @@ impl Kernels {
             &format!("const HAS_CLAMP: bool = {};\n", variant.has_clamp),
             &format!("const HAS_DETAIL: bool = {};\n", variant.has_detail),
             &format!("const HAS_MIRRORS: bool = {};\n", variant.has_mirrors),
+            &format!("const HAS_OBJECTS: bool = {};\n", variant.has_objects),
             GROUPS,
             include_str!("shaders/view.wgsl"),
             include_str!("shaders/arithmetic.wgsl"),
@@ -182,14 +204,14 @@ impl Kernels {
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
             [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19],
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
                 &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18],
             ]
         } else {
             [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18],
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
                 &[0, 1, 2, 3, 6, 8, 11, 12, 13, 18],
             ]
         };
@@ -229,6 +251,7 @@ struct Traced {
     samples: u32,
     sources: u32,
     has_odd: bool,
+    has_objects: bool,
 }
 
 #[derive(Debug, Default)]
@@ -247,12 +270,13 @@ struct TraceArrays {
     texels: Array,
     constants: Array,
     detail: Array,
+    objects: Array,
     /// The version of the tables that these three hold.
     tables: Option<u64>,
 }
 
 impl TraceArrays {
-    fn all(&self) -> [&Array; 13] {
+    fn all(&self) -> [&Array; 14] {
         let [rays, other_rays] = &self.rays;
         [
             &self.colors,
@@ -268,6 +292,7 @@ impl TraceArrays {
             &self.texels,
             &self.constants,
             &self.detail,
+            &self.objects,
         ]
     }
 
@@ -301,6 +326,11 @@ const fn film_bytes(has_odd: bool, has_clamp: bool) -> u64 {
     16 * (1 + has_odd as u64 + has_clamp as u64)
 }
 
+/// Memory of the first surfaces of the samples of a pixel, bytes.
+const fn object_bytes(has_objects: bool, samples: u32) -> u64 {
+    if has_objects { 4 * samples as u64 } else { 0 }
+}
+
 /// Memory of the device for the film and the queues of each pixel, bytes.
 pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
     let has_paths = settings.integrator == IntegratorKind::Path;
@@ -310,7 +340,8 @@ pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
         lights: u32::try_from(scene.lights.len()).unwrap_or(u32::MAX),
     };
     let film = film_bytes(settings.has_features, has_paths && settings.clamp.is_some());
-    4 + film + 32 + 2 * rays.ray_bytes() + rays.shadow_bytes() * u64::from(rays.sources())
+    let objects = object_bytes(settings.channels.mattes().next().is_some(), settings.samples);
+    4 + film + 32 + objects + 2 * rays.ray_bytes() + rays.shadow_bytes() * u64::from(rays.sources())
 }
 
 impl Renderer {
@@ -387,6 +418,7 @@ impl Renderer {
             has_clamp: picture.has_clamp(),
             has_detail: picture.detail().is_some(),
             has_mirrors: picture.ray_kinds().has_mirrors,
+            has_objects: picture.has_objects,
             is_common: shape.is_common,
             levels: shape.levels.max(MIN_STACK_LEVELS),
         };
@@ -417,6 +449,7 @@ impl Renderer {
             samples: picture.samples.count,
             sources: picture.sources(),
             has_odd: picture.has_odd,
+            has_objects: picture.has_objects,
         });
         device.check()
     }
@@ -433,22 +466,27 @@ impl Renderer {
         device: &Device,
         store: impl FnOnce(&Pixels<'_>) -> T,
     ) -> Result<T, GpuError> {
-        let Traced { pixels, has_odd, .. } = self.traced.expect("a picture was traced");
-        let film = if has_odd { 32 * pixels } else { 16 * pixels };
-        self.download.reserve(device, film + 32 * pixels)?;
+        let Traced { pixels, samples, has_odd, has_objects, .. } =
+            self.traced.expect("a picture was traced");
+        let film = film_bytes(has_odd, false) * pixels;
+        let objects = object_bytes(has_objects, samples) * pixels;
+        self.download.reserve(device, film + 32 * pixels + objects)?;
         let mut commands = Commands::new(device);
         commands.copy(&self.arrays.film, &self.download, [0, film]);
         commands.copy(&self.arrays.data, &self.download, [film, 32 * pixels]);
+        commands.copy(&self.arrays.objects, &self.download, [film + 32 * pixels, objects]);
         commands.submit();
         self.download.with_content(device, |bytes| {
             #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
-            let (film, nearest) = bytes.split_at(film as usize);
-            #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
-            let (sums, odd) = film.split_at(16 * pixels as usize);
+            let [film, pixels, objects] = [film, pixels, objects].map(|length| length as usize);
+            let (film, others) = bytes.split_at(film);
+            let (sums, odd) = film.split_at(16 * pixels);
+            let (nearest, objects) = (&others[..32 * pixels], &others[32 * pixels..][..objects]);
             store(&Pixels {
                 sums: bytemuck::cast_slice(sums),
                 odd: bytemuck::cast_slice(odd),
                 nearest: bytemuck::cast_slice(nearest),
+                objects: bytemuck::cast_slice(objects),
             })
         })
     }
@@ -491,6 +529,8 @@ impl Renderer {
         let arrays = &mut self.arrays;
         arrays.film.reserve(device, "pixels", film * pixels)?;
         arrays.data.reserve(device, "pixels", 32 * pixels)?;
+        let objects = object_bytes(picture.has_objects, picture.samples.count);
+        arrays.objects.reserve(device, "objects of all samples", objects * pixels)?;
         for queue in &mut arrays.rays {
             queue.reserve(device, "rays", rays.ray_bytes() * pixels)?;
         }
@@ -623,6 +663,7 @@ impl Renderer {
             16 => &arrays.texels,
             17 => &arrays.constants,
             19 => &arrays.detail,
+            20 => &arrays.objects,
             _ => return self.tree.traversal_array(binding).expect("1 to 3 are those of the tree"),
         };
         array.binding()

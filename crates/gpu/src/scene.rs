@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
-    DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, store_pixels,
+    DeviceHit, DeviceObject, DevicePixel, DevicePixels, Extent, extent_of, store_pixels, stores_all,
 };
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
@@ -46,7 +46,7 @@ pub enum Missing {
     LightExtent,
     /// More lights than [`MAX_LIGHTS`].
     Lights,
-    /// Channels that are not from the nearest sample.
+    /// Channels with parts of the light.
     Layers,
     /// Outlines and the fading with distance.
     Drawing,
@@ -65,7 +65,7 @@ impl fmt::Display for Missing {
             Self::Panorama => "equirectangular pictures",
             Self::LightExtent => "lights with an extent in Whitted's model",
             Self::Lights => "more than eight lights",
-            Self::Layers => "layers of light and Cryptomatte",
+            Self::Layers => "layers of light",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
         })
@@ -90,7 +90,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (camera.projection().is_panorama(), Missing::Panorama),
         (scene.lights.iter().any(has_extent) && is_whitted, Missing::LightExtent),
         (scene.lights.len() > MAX_LIGHTS, Missing::Lights),
-        (!are_from_nearest(&settings.channels), Missing::Layers),
+        (!stores_all(&settings.channels), Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
     ]
@@ -255,14 +255,8 @@ impl SceneRenderer {
     ) -> Result<Cost, SceneError> {
         self.trace(scene, source, settings, stop)?;
         let store = |pixels: &Pixels<'_>| {
-            let share = 1.0 / settings.samples as f32;
-            let odd_share = 1.0 / (settings.samples / 2).max(1) as f32;
-            let pixel = |number: usize| DevicePixel {
-                color: pixels.sums[number].map(|sum| sum * share),
-                odd: pixels.odd.get(number).copied().unwrap_or_default().map(|sum| sum * odd_share),
-                nearest: hit_of(&pixels.nearest[number]),
-            };
-            store_pixels(film, scene, source, settings, &pixel)
+            let pixels = SummedPixels { pixels: *pixels, samples: settings.samples };
+            store_pixels(film, scene, source, settings, &pixels)
         };
         self.renderer.read(&self.device, store)??;
         Ok(self.renderer.cost(&self.device)?)
@@ -309,6 +303,7 @@ impl SceneRenderer {
             background: background_of(&scene.background),
             is_transparent: settings.transparent_background,
             has_odd: settings.has_features,
+            has_objects: settings.channels.mattes().next().is_some(),
             model: match settings.integrator {
                 IntegratorKind::Whitted => Model::Whitted,
                 IntegratorKind::Path => Model::Paths(self.lighting.of(scene, source, settings)),
@@ -317,6 +312,32 @@ impl SceneRenderer {
             lights: &lights,
         };
         Ok(self.renderer.trace(&self.device, &picture, &|| stop.is_raised())?)
+    }
+}
+
+/// Pixels with their number of samples.
+struct SummedPixels<'a> {
+    pixels: Pixels<'a>,
+    samples: u32,
+}
+
+impl DevicePixels for SummedPixels<'_> {
+    fn pixel(&self, number: usize) -> DevicePixel {
+        let Pixels { sums, odd, nearest, .. } = self.pixels;
+        let share = 1.0 / self.samples as f32;
+        let odd_share = 1.0 / (self.samples / 2).max(1) as f32;
+        DevicePixel {
+            color: sums[number].map(|sum| sum * share),
+            odd: odd.get(number).copied().unwrap_or_default().map(|sum| sum * odd_share),
+            nearest: hit_of(&nearest[number]),
+        }
+    }
+
+    fn objects(&self, number: usize) -> impl Iterator<Item = DeviceObject> {
+        let samples = self.samples as usize;
+        let objects = &self.pixels.objects[samples * number..][..samples];
+        let surfaces = objects.iter().filter_map(|object| object.surface());
+        surfaces.map(|(particle, coverage)| DeviceObject { particle, coverage })
     }
 }
 

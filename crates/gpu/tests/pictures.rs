@@ -145,6 +145,24 @@ fn indirect_light_has_the_limit_of_the_cpu() {
     assert_eq!(support::film(&mut renderer, &case).1.lost_steps, 0);
 }
 
+/// Also parts of pixels that the ground covers.
+#[test]
+fn mattes_are_those_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    let whitted = Case { has_mattes: true, samples: 8, particles: 400, ..Case::small() };
+    for case in [
+        whitted,
+        Case { paths: Some(Paths::Metal), opacity: Some(Opacity::Style(0.5)), ..whitted },
+        Case { paths: Some(Paths::Catcher), ..whitted },
+        Case { paths: Some(Paths::Lights), ..whitted },
+    ] {
+        let found = support::compare(&mut renderer, &case, level);
+        assert_eq!([found.ids, found.mattes], [0; 2], "{case:?}");
+    }
+}
+
 #[test]
 fn every_run_gives_the_same_bytes() {
     let Some(device) = device(Checks::Off) else { return };

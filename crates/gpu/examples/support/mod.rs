@@ -133,6 +133,8 @@ pub(crate) struct Case {
     pub(crate) paths: Option<Paths>,
     /// Opacities: one, or by an attribute.
     pub(crate) opacity: Option<Opacity>,
+    /// Cryptomatte, on a transparent background.
+    pub(crate) has_mattes: bool,
     /// Limit of indirect light.
     pub(crate) clamp: Option<f32>,
 }
@@ -155,6 +157,7 @@ impl Case {
             window: None,
             paths: None,
             opacity: None,
+            has_mattes: false,
             clamp: None,
         }
     }
@@ -171,7 +174,8 @@ impl Case {
 
     /// The settings of the picture.
     pub(crate) fn settings(&self) -> RenderSettings {
-        let names = ["RGBA", "Z", "N", "P", "V", "id"];
+        let names = ["RGBA", "Z", "N", "P", "V", "id", "cryptomatte"];
+        let names = if self.has_mattes { &names[..] } else { &names[..6] };
         let is_ambient = self.paths == Some(Paths::Ambient);
         RenderSettings {
             integrator: match self.paths {
@@ -184,12 +188,13 @@ impl Case {
                 IndirectLight::Traced
             },
             has_features: self.paths.is_some(),
-            transparent_background: matches!(self.paths, Some(Paths::Catcher | Paths::Coats)),
+            transparent_background: self.has_mattes
+                || matches!(self.paths, Some(Paths::Catcher | Paths::Coats)),
             samples: self.samples,
             seed: self.seed,
             max_depth: self.max_depth,
             clamp: self.clamp,
-            channels: Channels::from_names(names).expect("known names"),
+            channels: Channels::from_names(names.iter().copied()).expect("known names"),
             window: self.window.map(|[left, top]| DataWindow {
                 image: [self.width, self.height],
                 left,
@@ -402,6 +407,8 @@ pub(crate) struct Difference {
     pub(crate) normals: usize,
     pub(crate) positions: usize,
     pub(crate) coverages: usize,
+    /// Pixels with other objects of Cryptomatte.
+    pub(crate) mattes: usize,
     /// The largest difference of a colour.
     pub(crate) color: f32,
     /// The mean of the differences of colours, relative to the mean colour; and that of their sums over all pixels.
@@ -539,6 +546,14 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
         lost: [(&found, ray_counts(&cost)), (&expected, rays)]
             .map(|(film, rays)| rays.lost.part(&film.color, case.samples)),
         ray_ratio: secondary(ray_counts(&cost)) / secondary(rays).max(1.0),
+        mattes: if case.has_mattes {
+            let levels = 2 * usize::from(case.settings().channels.layers.matte_levels);
+            let kinds =
+                [FilmPlane::CryptoParticle, FilmPlane::CryptoMaterial, FilmPlane::CryptoPart];
+            kinds.into_iter().map(|plane| differing(plane, levels)).sum()
+        } else {
+            0
+        },
         ids: differing(FilmPlane::Id, 1),
         depths: differing(FilmPlane::Depth, 1),
         normals: differing(FilmPlane::Normal, 3),

@@ -303,7 +303,11 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
       next_rays[RAY * place + 3u] = vec4<f32>(diffuse, 0.0);
     }
   }
-  if (is_ray) { add_light(path.pixel, sum, direct); }
+  if (is_ray) {
+    add_light(path.pixel, sum, direct);
+    let of_ground = object_of_ground(select(1.0, ground.opacity, view.transparent == 1u));
+    keep_object(path.pixel, select(select(MISS, of_ground, is_ground && !is_caught), hit.index, is_sphere));
+  }
 }
 
 // Camera rays, in squares of 8x8 pixels.

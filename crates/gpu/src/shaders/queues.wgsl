@@ -24,6 +24,8 @@
 @group(0) @binding(14) var<storage, read_write> sums: array<u32>;
 
 @group(0) @binding(18) var<uniform> current: Current;
+// The first surface of each sample, pixel by pixel
+@group(0) @binding(20) var<storage, read_write> objects: array<u32>;
 
 // Invocations of a workgroup that follows a queue
 const GROUP: u32 = 64u;
@@ -52,6 +54,14 @@ fn add_to_film(pixel: u32, sum: vec4<f32>) {
   film[pixel] += sum;
   if (view.has_odd == 1u && (current.sample & 1u) == 1u) { film[view.width * view.height + pixel] += sum; }
 }
+
+// Keeps the first surface of a sample (HAS_OBJECTS): the index of a sphere, `object_of_ground`, or MISS.
+fn keep_object(pixel: u32, object: u32) {
+  if (HAS_OBJECTS && stage.depth == 1u) { objects[pixel * view.samples + current.sample] = object; }
+}
+
+// The ground with its coverage, as a negative number
+fn object_of_ground(coverage: f32) -> u32 { return bitcast<u32>(-coverage); }
 
 // Empties a pixel before its first sample.
 fn clear_pixel(pixel: u32) {

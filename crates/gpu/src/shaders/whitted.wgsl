@@ -107,7 +107,10 @@ fn follow(is_ray: bool, ray: Ray, throughput: f32, pixel: u32, hit: Hit, on_film
       shadows[SHADOW * place + 1u] = vec4<f32>(radiance, 0.0);
     }
   }
-  if (is_ray) { add_to_film(pixel, sum); }
+  if (is_ray) {
+    add_to_film(pixel, sum);
+    keep_object(pixel, select(MISS, hit.index, is_hit));
+  }
 }
 
 // Camera rays, in squares of 8x8 pixels.
