@@ -78,6 +78,7 @@ mod arrays;
 mod commands;
 mod device;
 mod error;
+mod kernels;
 mod lighting;
 mod open;
 mod picture;

@@ -10,16 +10,13 @@ use spherule_tracer::scene::Scene;
 use wgpu::BindingResource;
 
 use crate::arrays::{Array, Download, Uniform, Uniforms};
-use crate::commands::{Commands, Kernel, Timer};
+use crate::commands::{Commands, Timer};
+use crate::kernels::{Kernels, Variant};
 use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
 use crate::picture::{FilmSize, Picture, Samples, View};
-use crate::tree::{GROUPS, Spheres, TreeBuilder, TreeShape, tree_constants};
+use crate::tree::{Spheres, TreeBuilder, TreeShape};
 use crate::{Device, GpuError};
 
-/// Entries of the traversal's stack for each level of nodes: all children but the one that is visited next.
-const STACK_PER_LEVEL: u32 = 7;
-/// Levels that the shortest stack holds. Fewer levels do not make it faster.
-const MIN_STACK_LEVELS: u32 = 6;
 /// Invocations in a workgroup.
 const GROUP: u64 = 64;
 /// Counters of the light that is lost.
@@ -126,104 +123,6 @@ struct Stage {
 struct Current {
     sample: u32,
     zeros: [u32; 3],
-}
-
-/// Kernels for trees of one kind.
-#[derive(Debug)]
-struct Kernels {
-    empty_queues: Kernel,
-    trace_camera: Kernel,
-    trace_next: Kernel,
-    trace_shadow: Kernel,
-    /// If indirect light has a limit.
-    clamp_indirect: Option<Kernel>,
-}
-
-/// What the source of the kernels depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Variant {
-    /// Whether paths are traced.
-    has_paths: bool,
-    /// Whether spheres have an opacity each.
-    has_opacity: bool,
-    /// Whether indirect light has a limit.
-    has_clamp: bool,
-    /// Whether the environment has an image at its own resolution.
-    has_detail: bool,
-    /// Whether mirrors see the environment through a shadow catcher.
-    has_mirrors: bool,
-    /// Whether the first surfaces of samples are kept.
-    has_objects: bool,
-    /// Whether radii are equal.
-    is_common: bool,
-    /// Levels that the stack holds.
-    levels: u32,
-}
-
-/// The sources of path tracing.
-const PATHS: [&str; 5] = [
-    include_str!("shaders/scene.wgsl"),
-    include_str!("shaders/environment.wgsl"),
-    include_str!("shaders/ground.wgsl"),
-    include_str!("shaders/bsdf.wgsl"),
-    include_str!("shaders/path.wgsl"),
-];
-const WHITTED: [&str; 1] = [include_str!("shaders/whitted.wgsl")];
-
-impl Kernels {
-    fn new(device: &Device, variant: Variant) -> Self {
-        let append = if device.has_subgroups() {
-            include_str!("shaders/append_subgroup.wgsl")
-        } else {
-            include_str!("shaders/append_atomic.wgsl")
-        };
-        let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
-        let source = [
-            device.arithmetic().source(),
-            &tree_constants(variant.is_common),
-            &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * variant.levels),
-            &format!("const HAS_OPACITY: bool = {};\n", variant.has_opacity),
-            &format!("const HAS_CLAMP: bool = {};\n", variant.has_clamp),
-            &format!("const HAS_DETAIL: bool = {};\n", variant.has_detail),
-            &format!("const HAS_MIRRORS: bool = {};\n", variant.has_mirrors),
-            &format!("const HAS_OBJECTS: bool = {};\n", variant.has_objects),
-            GROUPS,
-            include_str!("shaders/view.wgsl"),
-            include_str!("shaders/arithmetic.wgsl"),
-            include_str!("shaders/functions.wgsl"),
-            include_str!("shaders/traverse.wgsl"),
-            include_str!("shaders/camera.wgsl"),
-            include_str!("shaders/surface.wgsl"),
-            include_str!("shaders/lights.wgsl"),
-            include_str!("shaders/queues.wgsl"),
-            include_str!("shaders/sampler.wgsl"),
-            append,
-            &model.concat(),
-        ];
-        let module = device.module(&source.concat());
-        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
-        let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
-            [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
-                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18],
-            ]
-        } else {
-            [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
-                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 18],
-            ]
-        };
-        Self {
-            empty_queues: kernel("empty_queues", &[8, 13, 14]),
-            trace_camera: kernel("trace_camera", camera),
-            trace_next: kernel("trace_next", next),
-            trace_shadow: kernel("trace_shadow", shadow),
-            clamp_indirect: (variant.has_clamp)
-                .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18])),
-        }
-    }
 }
 
 /// Renders one frame after another on a device, in memory that is kept.
@@ -412,16 +311,7 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         self.reserve(device, picture)?;
         let shape = *self.tree.shape();
-        let variant = Variant {
-            has_paths: picture.has_paths(),
-            has_opacity: self.has_opacity,
-            has_clamp: picture.has_clamp(),
-            has_detail: picture.detail().is_some(),
-            has_mirrors: picture.ray_kinds().has_mirrors,
-            has_objects: picture.has_objects,
-            is_common: shape.is_common,
-            levels: shape.levels.max(MIN_STACK_LEVELS),
-        };
+        let variant = Variant::of(picture, &shape, self.has_opacity);
         self.kernels.entry(variant).or_insert_with(|| Kernels::new(device, variant));
         let plan = self.plan(picture, &shape);
         self.uniforms.upload(device)?;
