@@ -7,7 +7,7 @@ use std::time::Instant;
 use spherule_files::memory::MemoryUse;
 use spherule_gpu::{
     AdapterSummary, Arithmetic, Checks, Cost, Device, GpuError, MAX_FINISHES, Missing, SceneError,
-    SceneRenderer, bytes_per_pixel, missing, ray_counts, spheres_within, tree_bytes,
+    SceneRenderer, bytes_per_pixel, largest_array, missing, ray_counts, spheres_within, tree_bytes,
 };
 
 use super::load::{LoadedFrame, LoadedParticles};
@@ -137,8 +137,8 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     .next()
 }
 
-/// Whether the particles of a style are spheres that light does not enter, whose material differs from that of others only in how paths leave
-/// it.
+/// Whether the particles of a style are spheres that light does not enter, whose material differs from that of others
+/// only in how paths leave it.
 fn is_plain(setup: &Setup, style: &ParticleStyle) -> bool {
     let picture = &setup.picture;
     let own = picture.scene.material(style.material);
@@ -180,10 +180,13 @@ pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
     if particles > most {
         return Err(Some(format!("a frame has {particles} particles, and {name} takes {most}")));
     }
-    if detail_bytes(setup) > *max_array {
-        let most = max_array >> 20;
+    let picture = &setup.picture;
+    let largest = largest_array(&picture.scene, &picture.render).max(detail_bytes(setup));
+    if largest > *max_array {
         return Err(Some(format!(
-            "environment.detail: the image is larger than the {most} MiB that {name} takes"
+            "a picture has an array of {} MiB, and {name} takes {} MiB",
+            largest >> 20,
+            max_array >> 20,
         )));
     }
     Ok(())
@@ -218,13 +221,15 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
     let has_colors = rules.first().color.is_by_particle() || rules.is_divided();
     let is_opaque = |style: &ParticleStyle| style.opacity == OpacityRule::OPAQUE;
-    let colors = match (rules.styles.iter().all(is_opaque), has_colors) {
-        (false, _) => 16 * particles,
-        (true, true) => 12 * particles,
-        (true, false) => 0,
+    let bytes_of_color = if !rules.styles.iter().all(is_opaque) {
+        16
+    } else if has_colors {
+        12
+    } else {
+        0
     };
     let of_pixels = bytes_per_pixel(&picture.scene, &picture.render) * pixels;
-    tree_bytes(particles, is_common) + colors + of_pixels + detail_bytes(setup)
+    tree_bytes(particles, is_common) + bytes_of_color * particles + of_pixels + detail_bytes(setup)
 }
 
 /// Renders frame after frame on the device.

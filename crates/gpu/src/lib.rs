@@ -98,7 +98,9 @@ pub use lighting::{
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-pub use renderer::{Colors, Cost, NearestSample, Pixels, Renderer, SampleObject, bytes_per_pixel};
+pub use renderer::{
+    Colors, Cost, NearestSample, Pixels, Renderer, SampleObject, bytes_per_pixel, largest_array,
+};
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use tree::{
     Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, spheres_within, tree_bytes,

@@ -230,16 +230,29 @@ const fn object_bytes(has_objects: bool, samples: u32) -> u64 {
     if has_objects { 4 * samples as u64 } else { 0 }
 }
 
-/// Memory of the device for the film and the queues of each pixel, bytes.
-pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
+/// What the rays of a picture of `scene` with these settings are, and the memory of the first surfaces of a pixel.
+fn needs_of(scene: &Scene, settings: &RenderSettings) -> (RayKinds, u64) {
     let has_paths = settings.integrator == IntegratorKind::Path;
     let rays = RayKinds {
         has_paths,
         has_mirrors: has_paths && mirrors_see_through(scene, settings),
         lights: u32::try_from(scene.lights.len()).unwrap_or(u32::MAX),
     };
-    let film = film_bytes(settings.has_features, has_paths && settings.clamp.is_some());
-    let objects = object_bytes(settings.channels.mattes().next().is_some(), settings.samples);
+    (rays, object_bytes(settings.channels.mattes().next().is_some(), settings.samples))
+}
+
+/// The largest array for the pixels and rays of a picture, bytes.
+pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
+    let (rays, objects) = needs_of(scene, settings);
+    let shadows = rays.shadow_bytes() * u64::from(rays.sources());
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    shadows.max(rays.ray_bytes()).max(objects) * pixels
+}
+
+/// Memory of the device for the film and the queues of each pixel, bytes.
+pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
+    let (rays, objects) = needs_of(scene, settings);
+    let film = film_bytes(settings.has_features, rays.has_paths && settings.clamp.is_some());
     4 + film + 32 + objects + 2 * rays.ray_bytes() + rays.shadow_bytes() * u64::from(rays.sources())
 }
 
@@ -592,8 +605,8 @@ fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
     }
 }
 
-/// Number of counters of a sample: the lengths of its queues, for each depth one of rays that go on, and one of shadow rays
-/// for each source; then the light that is lost.
+/// Number of counters of a sample: the lengths of its queues, for each depth one of rays that go on, and one of shadow
+/// rays for each source; then the light that is lost.
 fn counter_count(picture: &Picture<'_>) -> u32 {
     #[expect(clippy::cast_possible_truncation, reason = "it is 2")]
     let lost = LOST_WORDS as u32;

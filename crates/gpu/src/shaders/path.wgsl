@@ -4,9 +4,9 @@
 // heuristic, and each light is sampled. The path goes on in the direction of the BSDF; from the third reflection on it
 // ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights.
 //
-// A ray that goes on has its direction and density, and its throughput beside its origin, and the diffuse part of that
-// if mirrors see the environment through a shadow catcher (HAS_MIRRORS). A shadow ray has its direction
-// and length, and its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage.
+// A ray that goes on has its direction and density, and its throughput beside its origin; also the diffuse part of that
+// if mirrors see the environment through a shadow catcher (HAS_MIRRORS). A shadow ray has its direction and length, and
+// its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage.
 
 const RAY: u32 = select(3u, 4u, HAS_MIRRORS);
 const SHADOW: u32 = 3u;

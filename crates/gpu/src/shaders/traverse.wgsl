@@ -65,8 +65,8 @@ fn bytes_of(word: u32) -> vec4<f32> {
   return vec4<f32>(f32(word & 255u), f32((word >> 8u) & 255u), f32((word >> 16u) & 255u), f32(word >> 24u));
 }
 
-// For each child in which the ray is somewhere from `start` to `limit`: the distance, with the number of the child in the lowest three
-// bits; MISS for the others. The keys of distances that are not negative have the order of the distances.
+// For each child in which the ray is somewhere from `start` to `limit`: the distance, with the number of the child in the
+// lowest three bits; MISS for the others. The keys of distances that are not negative have the order of the distances.
 struct Keys { low: vec4<u32>, high: vec4<u32> }
 
 fn test_children(at: u32, p: Prepared, start: f32, limit: f32) -> Keys {
