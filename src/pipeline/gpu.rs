@@ -11,11 +11,11 @@ use spherule_gpu::{
 };
 
 use super::load::{LoadedFrame, LoadedParticles};
+use super::mattes;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{OpacityRule, ParticleStyle, RadiusRule, Setup, StyleForm};
 use super::shading::particle_shading;
 use super::surface::spheres;
-use super::trace::matte_attributes;
 use crate::render::{
     Film, IntegratorKind, RayCounts, RenderError, RenderSettings, ShadeSource, Stop,
 };
@@ -297,7 +297,7 @@ impl FrameRenderer for GpuRenderer {
             camera: setup.camera_at(frame.task.frame)?,
             task: frame.task.clone(),
             film,
-            texts: matte_attributes(setup, frame),
+            texts: mattes::attributes_of(setup, frame),
             facts: frame.facts.clone(),
             time: frame.time,
             report,
