@@ -7,10 +7,11 @@ use std::time::Instant;
 use spherule_files::memory::MemoryUse;
 use spherule_gpu::{
     AdapterSummary, Arithmetic, Checks, Cost, Device, GpuError, MAX_FINISHES, Missing, SceneError,
-    SceneRenderer, bytes_per_pixel, missing, ray_counts, spheres_within, tree_bytes,
+    SceneRenderer, bytes_per_pixel, largest_array, missing, ray_counts, spheres_within, tree_bytes,
 };
 
 use super::load::{LoadedFrame, LoadedParticles};
+use super::mattes;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{OpacityRule, ParticleStyle, RadiusRule, Setup, StyleForm};
 use super::shading::particle_shading;
@@ -21,7 +22,7 @@ use crate::render::{
 use crate::report::FrameReport;
 use crate::report::frame::{BuildSummary, DeviceSummary};
 use crate::scene::material::DEFAULT_COLOR;
-use crate::scene::{Finish, Material};
+use crate::scene::{Environment, Finish, Material};
 use crate::surface::SurfaceKind;
 
 /// The number of the adapter that the user chose.
@@ -88,10 +89,10 @@ fn no_device(adapters: &[AdapterSummary]) -> TraceError {
 fn failed(error: GpuError) -> TraceError {
     match error {
         GpuError::Interrupted => TraceError::Render(RenderError::Interrupted),
-        GpuError::Lost(_) => {
-            // The next frame opens a new device
+        GpuError::Lost { .. } => {
+            // The next frame opens it again
             *lock(&DEVICE) = None;
-            TraceError::Device(error.to_string())
+            TraceError::Device(format!("{error}; run the command again to render the frame"))
         }
         _ => TraceError::Device(error.to_string()),
     }
@@ -120,13 +121,11 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
         (picture.view.shutter.is_some()).then(|| ("camera.shutter", "motion blur".to_owned())),
         (picture.surface.kind != SurfaceKind::Spheres)
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
-        (rules.first().opacity != OpacityRule::OPAQUE)
-            .then(|| ("material.opacity", "opacities below 1".to_owned())),
         rules.first().bonds.is_some().then(|| ("bonds", "bonds".to_owned())),
         (rules.styles.len() > MAX_FINISHES)
             .then(|| ("style", format!("more than {} styles", MAX_FINISHES - 1))),
         (!rules.others().iter().all(|style| is_plain(setup, style)))
-            .then(|| ("style", "other styles than opaque spheres".to_owned())),
+            .then(|| ("style", "styles of anything but spheres".to_owned())),
         (!rules.cut.is_everywhere()).then(|| ("clip", "particles that are cut".to_owned())),
         (!things.meshes.is_empty()).then(|| ("mesh", "meshes".to_owned())),
         (things.cell.is_some()).then(|| ("cell", "the simulation cell".to_owned())),
@@ -138,8 +137,8 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     .next()
 }
 
-/// Whether the particles of a style are opaque spheres, whose material differs from that of others only in how paths leave
-/// it.
+/// Whether the particles of a style are spheres that light does not enter, whose material differs from that of others
+/// only in how paths leave it.
 fn is_plain(setup: &Setup, style: &ParticleStyle) -> bool {
     let picture = &setup.picture;
     let own = picture.scene.material(style.material);
@@ -154,7 +153,6 @@ fn is_plain(setup: &Setup, style: &ParticleStyle) -> bool {
     };
     let is_traced = picture.render.integrator == IntegratorKind::Path;
     matches!(style.form, StyleForm::Spheres)
-        && style.opacity == OpacityRule::OPAQUE
         && style.bonds.is_none()
         && is_known
         && own.transmission == 0.0
@@ -182,6 +180,15 @@ pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
     if particles > most {
         return Err(Some(format!("a frame has {particles} particles, and {name} takes {most}")));
     }
+    let picture = &setup.picture;
+    let largest = largest_array(&picture.scene, &picture.render).max(detail_bytes(setup));
+    if largest > *max_array {
+        return Err(Some(format!(
+            "a picture has an array of {} MiB, and {name} takes {} MiB",
+            largest >> 20,
+            max_array >> 20,
+        )));
+    }
     Ok(())
 }
 
@@ -197,11 +204,14 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Layers => "output.channels",
         Missing::Drawing => "render.outline",
         Missing::Holdout => "mesh",
-        Missing::Detail => "environment.detail",
-        Missing::Clamp => "render.clamp",
         Missing::Noise => "render.noise",
-        Missing::MirroredCatcher => "render.ground",
     }
+}
+
+/// Memory of the image of the environment at its own resolution, bytes.
+fn detail_bytes(setup: &Setup) -> u64 {
+    let environment = setup.picture.scene.environment.as_deref();
+    environment.and_then(Environment::detail).map_or(0, |(map, _)| map.byte_len())
 }
 
 /// Memory of the device for a frame with that many particles, bytes.
@@ -211,11 +221,16 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
     let is_common = matches!(rules.first().radius, RadiusRule::Common(_)) && !rules.is_divided();
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
     let has_colors = rules.first().color.is_by_particle() || rules.is_divided();
-    let colors = if has_colors { 12 * particles } else { 0 };
-    let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
-    let has_paths = picture.render.integrator == IntegratorKind::Path;
-    let of_pixel = bytes_per_pixel(has_paths, lights, picture.render.has_features);
-    tree_bytes(particles, is_common) + colors + of_pixel * pixels
+    let is_opaque = |style: &ParticleStyle| style.opacity == OpacityRule::OPAQUE;
+    let bytes_of_color = if !rules.styles.iter().all(is_opaque) {
+        16
+    } else if has_colors {
+        12
+    } else {
+        0
+    };
+    let of_pixels = bytes_per_pixel(&picture.scene, &picture.render) * pixels;
+    tree_bytes(particles, is_common) + bytes_of_color * particles + of_pixels + detail_bytes(setup)
 }
 
 /// Renders frame after frame on the device.
@@ -238,12 +253,7 @@ impl FrameRenderer for GpuRenderer {
         };
         report.seconds.read = frame.read_time.as_secs_f64();
         let start = Instant::now();
-        let renderer = self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let renderer = match renderer {
-            Some(renderer) => renderer,
-            None => renderer.insert(SceneRenderer::new(device()?)),
-        };
-        let particles = upload(renderer, setup, frame.particles)?;
+        let particles = upload(self.ready()?, setup, frame.particles)?;
         report.seconds.build = start.elapsed().as_secs_f64();
         report.bytes.attributes = match &particles {
             BuiltParticles::Decoded(shading) => shading.byte_len(),
@@ -274,7 +284,9 @@ impl FrameRenderer for GpuRenderer {
         let memory = MemoryUse::now();
         let mut report = frame.report.clone();
         report.seconds.trace = start.elapsed().as_secs_f64();
-        report.rays = ray_counts(&cost).into();
+        let rays = ray_counts(&cost);
+        report.clamped_light = rays.lost.part(&film.color, setup.picture.render.samples);
+        report.rays = rays.into();
         report.build = BuildSummary {
             structure: "lbvh".to_owned(),
             order: "hilbert".to_owned(),
@@ -286,7 +298,7 @@ impl FrameRenderer for GpuRenderer {
             camera: setup.camera_at(frame.task.frame)?,
             task: frame.task.clone(),
             film,
-            texts: Vec::new(),
+            texts: mattes::attributes_of(setup, frame),
             facts: frame.facts.clone(),
             time: frame.time,
             report,
@@ -335,6 +347,14 @@ fn upload(
 }
 
 impl GpuRenderer {
+    /// The renderer of the shared device. A device that was lost is opened again.
+    fn ready(&mut self) -> Result<&mut SceneRenderer, TraceError> {
+        let device = device()?;
+        let kept = self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let current = kept.take().filter(|of| std::ptr::eq(of.device(), &*device));
+        Ok(kept.insert(current.unwrap_or_else(|| SceneRenderer::new(device))))
+    }
+
     fn draw(
         &self,
         setup: &Setup,
@@ -372,5 +392,47 @@ impl GpuRenderer {
             trace: cost.trace_seconds,
             bytes: cost.bytes,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::accel::{SphereRadius, Spheres};
+    use crate::render::ParticleShading;
+    use crate::scene::{Camera, CameraView, Scene};
+
+    #[test]
+    fn a_lost_device_is_opened_again() {
+        if spherule_gpu::adapters().is_empty() && std::env::var_os("SPHERULE_GPU").is_none() {
+            return;
+        }
+        choose(0);
+        let mut renderer = GpuRenderer::default();
+        let spheres = Spheres { centers: &[Vec3::ZERO], radius: SphereRadius::Common(1.0) };
+        let view =
+            CameraView { eye: DVec3::X * 5.0, look_at: DVec3::ZERO, up: DVec3::Z, fov: 45.0 };
+        let scene = Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap());
+        let integrator = IntegratorKind::Whitted;
+        let settings = RenderSettings { integrator, ..RenderSettings::new(8, 8) };
+        let mut render = || {
+            let shading = ParticleShading::constant(Vec3::ONE);
+            let (mut film, never) = (Film::default(), AtomicBool::new(false));
+            let renderer = renderer.ready()?;
+            renderer.prepare(&spheres, &shading).map_err(failed)?;
+            let rendered = renderer.render_into(&mut film, &scene, &shading, &settings, &never);
+            rendered.map_err(scene_failed).map(|_| film.color)
+        };
+        let first = render().unwrap();
+        let device = device().unwrap();
+        device.destroy();
+        let error = render().unwrap_err().to_string();
+        assert!(error.contains(&device.adapter().name), "{error}");
+        assert!(error.ends_with("run the command again to render the frame"), "{error}");
+        assert!(render().unwrap() == first);
     }
 }

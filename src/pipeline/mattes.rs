@@ -3,12 +3,15 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use super::renderer::{BuiltFrame, BuiltParticles};
 use super::setup::Setup;
+use super::shading::particle_shading;
 use crate::output::TextAttribute;
 use crate::render::ShadeSource;
 use crate::render::cryptomatte::{ObjectName, murmur_hash3, object_of};
 use crate::render::layers::MatteKind;
 use crate::scene::Owner;
+use crate::scene::material::DEFAULT_COLOR;
 
 /// Maximum number of names in a manifest. A manifest of more names is left out.
 const MAX_NAMES: usize = 100_000;
@@ -24,12 +27,24 @@ pub(super) fn predicted_bytes(setup: &Setup, particles: u64) -> u64 {
     3 * NAME_BYTES * names * mattes.count() as u64
 }
 
+/// The attributes of the Cryptomatte layers of `frame`.
+pub(super) fn attributes_of(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
+    if setup.picture.render.channels.mattes().next().is_none() {
+        return Vec::new();
+    }
+    let (count, picture) = (frame.report.particles, &setup.picture);
+    match &frame.particles {
+        BuiltParticles::Decoded(shading) => {
+            attributes(setup, &particle_shading(picture, shading), count)
+        }
+        BuiltParticles::Stored(stored) => {
+            attributes(setup, &stored.shading(picture, DEFAULT_COLOR), count)
+        }
+    }
+}
+
 /// The attributes of all Cryptomatte layers of an image of `particles` particles.
-pub(super) fn attributes(
-    setup: &Setup,
-    source: &dyn ShadeSource,
-    particles: u64,
-) -> Vec<TextAttribute> {
+fn attributes(setup: &Setup, source: &dyn ShadeSource, particles: u64) -> Vec<TextAttribute> {
     let mattes = setup.picture.render.channels.mattes();
     let count = u32::try_from(particles).unwrap_or(u32::MAX);
     let mut all = Vec::new();

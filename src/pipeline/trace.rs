@@ -16,7 +16,6 @@ use super::shading::particle_shading;
 use super::surface::{self, SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
-use crate::output::TextAttribute;
 use crate::render::{Film, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
 use crate::report::frame::{FileBytes, SamplingSummary};
@@ -106,7 +105,7 @@ impl FrameRenderer for CpuRenderer {
         let rays = self.draw(setup, frame, &mut film, stop)?;
         let memory = MemoryUse::now();
         // Name its objects while the particles are there
-        let texts = matte_attributes(setup, frame);
+        let texts = mattes::attributes_of(setup, frame);
         // Complete the report
         let mut report = frame.report.clone();
         report.seconds.trace = seconds(start.elapsed());
@@ -187,22 +186,6 @@ impl CpuRenderer {
                 stored.check()?;
                 Ok(rays)
             }
-        }
-    }
-}
-
-/// The attributes of the Cryptomatte layers of `frame`.
-fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
-    if setup.picture.render.channels.mattes().next().is_none() {
-        return Vec::new();
-    }
-    let (count, picture) = (frame.report.particles, &setup.picture);
-    match &frame.particles {
-        BuiltParticles::Decoded(shading) => {
-            mattes::attributes(setup, &particle_shading(picture, shading), count)
-        }
-        BuiltParticles::Stored(stored) => {
-            mattes::attributes(setup, &stored.shading(picture, DEFAULT_COLOR), count)
         }
     }
 }

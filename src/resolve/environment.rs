@@ -205,7 +205,7 @@ mod tests {
         assert!(to_light.y > 0.7 && to_light.z > 0.7, "{to_light}");
         assert!(notes.iter().any(|note| note.starts_with("a.exr: the sun in it is a light: elev")));
         // Light and sky have the factor
-        assert!(sky.has_detail());
+        assert!(sky.detail().is_some());
         let up = sky.irradiance(Vec3::Z).x / std::f32::consts::PI;
         assert!((up - 1.0).abs() < 1e-3, "{up}");
         assert!(radiance.x > 2.0, "{radiance}");
@@ -213,7 +213,7 @@ mod tests {
         manifest.environment.extract_sun = ExtractSun::Off;
         manifest.environment.detail = false;
         let (lights, notes, sky) = of(&manifest);
-        assert!(lights.is_empty() && notes.is_empty() && !sky.has_detail());
+        assert!(lights.is_empty() && notes.is_empty() && sky.detail().is_none());
         assert!(sky.irradiance(*to_light).x > 2.0 * up);
     }
 }

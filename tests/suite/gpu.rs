@@ -91,16 +91,34 @@ mod on_a_device {
         assert_equal(&workshop, ["gpu", "cpu"]);
     }
 
+    /// The part of the light that `render.clamp` takes away.
+    #[test]
+    fn limited_light_is_reported() {
+        let Some(workshop) = workshop_with_device() else { return };
+        let clamped_light = |out: &str, device: &[&str]| {
+            let limited = ["--set=render.clamp=0.05", "--set=output.preview=false"];
+            workshop.render_to(out, &[&limited[..], device].concat()).expect(0);
+            let report = std::fs::read_to_string(workshop.join(format!("{out}/report.json")));
+            let report = report.expect("a report");
+            let (_, rest) = report.split_once("\"clamped_light\":").expect("a number");
+            let number: String = rest.chars().take_while(|c| !matches!(c, ',' | '}')).collect();
+            number.trim().parse::<f64>().expect("a number")
+        };
+        let gpu = clamped_light("gpu", &DEVICE);
+        let cpu = clamped_light("cpu", &["--device=cpu"]);
+        assert!(cpu > 1e-4 && (gpu / cpu - 1.0).abs() < 0.02, "{gpu} {cpu}");
+    }
+
     #[test]
     fn styles_of_spheres_are_those_of_the_cpu() {
         let Some(workshop) = workshop_with_device() else { return };
-        let whitted = with(&["--style", "x > 0.5: spheres, radius 0.03, color red"]);
+        let whitted = with(&["--style", "x > 0.5: spheres, radius 0.03, color red, opacity 0.4"]);
         let paths = [
             "--style",
             "x > 1: spheres, radius 0.03, color gold, material { type = \"metal\", roughness = 0.3 }",
             "--style",
             "x > 0.5: spheres, color red, material { type = \"plastic\" }",
-            "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\"]",
+            "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\", \"cryptomatte\"]",
         ];
         for (number, look) in [&whitted[..], &paths].into_iter().enumerate() {
             let [gpu, cpu] = ["gpu", "cpu"].map(|device| format!("{device}{number}"));
@@ -109,8 +127,16 @@ mod on_a_device {
             }
             assert_equal(&workshop, [&gpu, &cpu]);
         }
-        let refused = [&DEVICE[..], &["--style", "x > 0.5: spheres, opacity 0.5"]].concat();
-        workshop.render_to("refused", &with(&refused)).expect(2).prints("other styles than opaque");
+        // The names of objects are in the header
+        for out in ["gpu1", "cpu1"] {
+            let file = std::fs::read(workshop.join(format!("{out}/f.0001.exr"))).expect("a file");
+            assert!(file.windows(8).any(|text| text == b"\"style1\""), "{out}");
+        }
+        let refused = [&DEVICE[..], &["--style", "x > 0.5: union"]].concat();
+        workshop
+            .render_to("refused", &with(&refused))
+            .expect(2)
+            .prints("styles of anything but spheres");
     }
 
     /// A device that is a program on the CPU is taken only where it is asked for.
@@ -128,9 +154,9 @@ mod on_a_device {
             assert!(report.contains("\"driver\""), "{report}");
         }
         // The first reason names its key, and no device is looked for
-        let lacking = ["still", "in", "-o", "a.png", "--opacity=0.5", "--gpu=99"];
+        let lacking = ["still", "in", "-o", "a.png", "--surface=union", "--gpu=99"];
         let ran = workshop.run(&[&lacking[..], &SMALL].concat()).expect(0);
-        ran.prints("rendered on the CPU: material.opacity: opacities below 1");
+        ran.prints("rendered on the CPU: render.surface: other surfaces");
     }
 
     #[test]
@@ -165,7 +191,6 @@ mod on_a_device {
             ),
             (&[whitted, "--ground=checker"], "render.ground: a ground"),
             (&[whitted, "--surface=union"], "render.surface"),
-            (&[whitted, "--opacity=0.5"], "material.opacity"),
             (&[whitted, "--gpu=9"], "there is no GPU 9"),
         ] {
             let still = ["still", "in", "-o", "a.png", "--device=gpu"];

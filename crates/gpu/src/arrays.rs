@@ -60,9 +60,8 @@ impl Upload {
         #[expect(clippy::cast_possible_truncation, reason = "a part of a slice")]
         let pieces = bytes.par_chunks(share as usize);
         pieces.zip(&self.parts).try_for_each(|(piece, part)| {
-            let lost = |error: wgpu::MapRangeError| GpuError::Lost(error.to_string());
             part.get_mapped_range_mut(..)
-                .map_err(lost)?
+                .map_err(|error| device.lost(&error))?
                 .slice(..piece.len())
                 .copy_from_slice(piece);
             part.unmap();
@@ -210,8 +209,7 @@ impl Download {
         // The result of the map is that of the wait
         buffer.map_async(MapMode::Read, .., |_result| ());
         device.wait()?;
-        let range =
-            buffer.get_mapped_range(..).map_err(|error| GpuError::Lost(error.to_string()))?;
+        let range = buffer.get_mapped_range(..).map_err(|error| device.lost(&error))?;
         let result = use_content(&range);
         drop(range);
         buffer.unmap();

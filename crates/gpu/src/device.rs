@@ -3,6 +3,7 @@
 //! wgpu panics at errors that nobody handles. Here a handler keeps the first one, and [`Device::check`], which follows
 //! each wait for the device, returns it.
 
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{
@@ -14,7 +15,7 @@ use crate::GpuError;
 use crate::arithmetic::Arithmetic;
 
 /// Storage arrays that one kernel uses.
-const STORAGE_ARRAYS: u32 = 13;
+const STORAGE_ARRAYS: u32 = 15;
 /// Memory that the invocations of a workgroup share, bytes: that of the kernel that sorts tiles.
 const WORKGROUP_MEMORY: u32 = 26 << 10;
 /// Invocations of the largest workgroup.
@@ -74,7 +75,11 @@ struct Faults(Mutex<Option<GpuError>>);
 
 impl Faults {
     fn keep(&self, fault: GpuError) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // The loss of the device is the reason of all other errors
+        if kept.is_none() || matches!(fault, GpuError::Lost { .. }) {
+            *kept = Some(fault);
+        }
     }
 }
 
@@ -120,7 +125,12 @@ impl Device {
         let kept = Arc::clone(&faults);
         raw.on_uncaptured_error(Arc::new(move |error: Error| kept.keep(fault_of(&error))));
         let kept = Arc::clone(&faults);
-        raw.set_device_lost_callback(move |_reason, message| kept.keep(GpuError::Lost(message)));
+        let adapter_name = name();
+        raw.set_device_lost_callback(move |_reason, reason| {
+            let is_known = !reason.is_empty();
+            let message = if is_known { reason } else { "the driver gives no reason".to_owned() };
+            kept.keep(GpuError::Lost { adapter: adapter_name.clone(), message });
+        });
         let arithmetic = Arithmetic::Separate;
         Ok(Self { raw, queue, adapter: summary(&adapter), arithmetic, checks, faults })
     }
@@ -151,6 +161,16 @@ impl Device {
         self.raw.features().contains(Features::SUBGROUP)
     }
 
+    /// Gives the device up, as if the driver had: for tests.
+    pub fn destroy(&self) {
+        self.raw.destroy();
+    }
+
+    /// The error of a device that has stopped to work.
+    pub(crate) fn lost(&self, message: &dyn fmt::Display) -> GpuError {
+        GpuError::Lost { adapter: self.adapter.name.clone(), message: message.to_string() }
+    }
+
     /// Waits until the device has done all that was submitted.
     ///
     /// # Errors
@@ -158,14 +178,14 @@ impl Device {
     pub(crate) fn wait(&self) -> Result<(), GpuError> {
         let waited = self.raw.poll(PollType::wait_indefinitely());
         self.check()?;
-        waited.map(drop).map_err(|error| GpuError::Lost(error.to_string()))
+        waited.map(drop).map_err(|error| self.lost(&error))
     }
 
     /// The first error since the last call, if there is one. A lost device stays lost.
     pub(crate) fn check(&self) -> Result<(), GpuError> {
         let mut kept = self.faults.0.lock().unwrap_or_else(PoisonError::into_inner);
         let found = match &*kept {
-            Some(GpuError::Lost(_)) => kept.clone(),
+            Some(GpuError::Lost { .. }) => kept.clone(),
             _ => kept.take(),
         };
         found.map_or(Ok(()), Err)

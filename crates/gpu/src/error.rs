@@ -60,8 +60,13 @@ pub enum GpuError {
     #[error("the memory of the GPU is full: {0}")]
     OutOfMemory(String),
     /// The device is gone: another program reset it, or the driver stopped a kernel that took too long.
-    #[error("the GPU was lost: {0}")]
-    Lost(String),
+    #[error("{adapter} was lost: {message}")]
+    Lost {
+        /// Name of the adapter.
+        adapter: String,
+        /// The driver's reason.
+        message: String,
+    },
     /// The driver reported another error.
     #[error("the GPU reported an error: {0}")]
     Driver(String),

@@ -3,7 +3,7 @@
 //!
 //! - [`Device`]: adapters, limits, and the self-test of the arithmetic.
 //! - [`Spheres`]: the order along a Hilbert curve, blocks of eight, levels of nodes.
-//! - [`Renderer`] and [`Picture`]: opaque spheres by Whitted's model, or by path tracing in a [`Lighting`].
+//! - [`Renderer`] and [`Picture`]: spheres by Whitted's model, or by path tracing in a [`Lighting`].
 //!
 //! This crate takes slices and plain values, and returns pixels: it knows no files, jobs or scenes. Which sphere a pixel
 //! shows, its depth, normal, position and coverage equal those of the CPU's kernels to the bit, if the device passes
@@ -25,6 +25,7 @@
 //!     centers: Centers::Points(&[[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]]),
 //!     radii: Radii::Common(0.8),
 //!     order: Order::Any(KeyLength::Short),
+//!     keeps_copies: false,
 //! };
 //! renderer.prepare(&device, &spheres, Colors::Constant([0.8, 0.2, 0.1]))?;
 //! let film = FilmSize { width: 16, height: 8, corner: [0, 0] };
@@ -40,6 +41,7 @@
 //!     film,
 //!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128], seed: 0 },
 //!     has_odd: false,
+//!     has_objects: false,
 //!     model: Model::Whitted,
 //!     max_depth: 1,
 //!     background: Background::Constant([0.0; 3]),
@@ -76,6 +78,7 @@ mod arrays;
 mod commands;
 mod device;
 mod error;
+mod kernels;
 mod lighting;
 mod open;
 mod picture;
@@ -89,12 +92,15 @@ pub use arithmetic::Arithmetic;
 pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
 pub use lighting::{
-    Catcher, Environment, Finish, Ground, Lighting, MAX_FINISHES, Model, Rough, TablePlace, Tables,
+    Catcher, Detail, Environment, Finish, Ground, Lighting, MAX_FINISHES, Model, Rough, TablePlace,
+    Tables,
 };
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-pub use renderer::{Colors, Cost, NearestSample, Pixels, Renderer, bytes_per_pixel};
+pub use renderer::{
+    Colors, Cost, NearestSample, Pixels, Renderer, SampleObject, bytes_per_pixel, largest_array,
+};
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use tree::{
     Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, spheres_within, tree_bytes,

@@ -1,6 +1,9 @@
 //! What path tracing needs beside the spheres: environment, ground, materials, in plain values.
 
+use std::sync::Arc;
+
 use bytemuck::{Pod, Zeroable};
+use spherule_tracer::scene::environment::DetailMap;
 
 /// Maximum number of groups of spheres that reflect light in different ways.
 pub const MAX_FINISHES: usize = 65;
@@ -14,14 +17,39 @@ pub enum Model<'a> {
     Paths(&'a Lighting),
 }
 
-/// Number of sources of shadow rays: the lights, and for paths the environment and their last segments.
-pub(crate) const fn source_count(has_paths: bool, lights: u32) -> u32 {
-    if has_paths { 2 + lights } else { lights }
+/// What the rays of a picture are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RayKinds {
+    /// Whether they are parts of paths.
+    pub(crate) has_paths: bool,
+    /// Whether mirrors see the environment through a shadow catcher.
+    pub(crate) has_mirrors: bool,
+    /// Number of lights.
+    pub(crate) lights: u32,
 }
 
-/// Memory of a ray that goes on, and of a shadow ray, bytes.
-pub(crate) const fn ray_bytes(has_paths: bool) -> u64 {
-    if has_paths { 48 } else { 32 }
+impl RayKinds {
+    /// The first light among the sources of shadow rays: those of paths begin with the environment and their last
+    /// segments.
+    pub(crate) const fn first_light(self) -> u32 {
+        if self.has_paths { 2 } else { 0 }
+    }
+
+    /// Number of sources of shadow rays. If there are mirrors, the environment and the lights of a catcher follow.
+    pub(crate) const fn sources(self) -> u32 {
+        let of_catcher = if self.has_mirrors { 1 + self.lights } else { 0 };
+        self.first_light() + self.lights + of_catcher
+    }
+
+    /// Memory of a ray that goes on, bytes.
+    pub(crate) const fn ray_bytes(self) -> u64 {
+        self.shadow_bytes() + if self.has_mirrors { 16 } else { 0 }
+    }
+
+    /// Memory of a shadow ray, bytes.
+    pub(crate) const fn shadow_bytes(self) -> u64 {
+        if self.has_paths { 48 } else { 32 }
+    }
 }
 
 /// The scene of path tracing.
@@ -31,6 +59,10 @@ pub struct Lighting {
     pub bounces: u32,
     /// If paths end at the second surface with an estimate: the distance at which half of the light arrives.
     pub ambient_reach: Option<f32>,
+    /// The limit of indirect light: the largest component that a ray may add to its sample.
+    pub indirect_limit: Option<f32>,
+    /// Whether metal and plastic see the environment through a shadow catcher.
+    pub has_mirrors: bool,
     /// The environment; None if it is black.
     pub environment: Option<Environment>,
     /// Whether camera rays see it instead of the background.
@@ -67,7 +99,7 @@ pub struct TablePlace {
 }
 
 /// Light from infinitely far away.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Environment {
     /// Unit vectors: right, back, up.
     pub axes: [[f32; 3]; 3],
@@ -75,8 +107,19 @@ pub struct Environment {
     pub table: TablePlace,
     /// The first pixel of the image, which has 512 columns and 256 rows.
     pub image: u32,
+    /// The image at its own resolution, which is seen instead.
+    pub detail: Option<Detail>,
     /// Irradiance in spherical harmonics.
     pub harmonics: [[f32; 3]; 9],
+}
+
+/// An image of an environment at its own resolution.
+#[derive(Debug, Clone)]
+pub struct Detail {
+    /// Its pixels.
+    pub map: Arc<DetailMap>,
+    /// A factor on their radiance, linear RGB.
+    pub scale: [f32; 3],
 }
 
 /// A plane that is visible from above.
@@ -157,10 +200,12 @@ pub(crate) struct SceneUniform {
     catcher: [u32; 4],
     image: u32,
     is_environment_visible: u32,
-    zeros: [u32; 2],
+    indirect_limit: f32,
     finish_count: u32,
+    detail_scale: [f32; 3],
     is_ambient: u32,
-    more_zeros: [u32; 2],
+    detail_size: [u32; 2],
+    zeros: [u32; 2],
     finishes: [FinishUniform; MAX_FINISHES],
     harmonics: [[f32; 4]; 9],
 }
@@ -199,6 +244,7 @@ impl From<&Lighting> for SceneUniform {
             is_ambient: lighting.ambient_reach.is_some().into(),
             reach: lighting.ambient_reach.unwrap_or_default(),
             is_environment_visible: lighting.is_environment_visible.into(),
+            indirect_limit: lighting.indirect_limit.unwrap_or_default(),
             ..Self::zeroed()
         };
         for (place, finish) in uniform.finishes.iter_mut().zip(&lighting.finishes) {
@@ -209,6 +255,11 @@ impl From<&Lighting> for SceneUniform {
             [uniform.axis_right, uniform.axis_back, uniform.axis_up] = environment.axes;
             uniform.environment = environment.table.into();
             uniform.image = environment.image;
+            if let Some(detail) = &environment.detail {
+                uniform.detail_size =
+                    detail.map.size().map(|side| u32::try_from(side).expect("below 2^32 pixels"));
+                uniform.detail_scale = detail.scale;
+            }
             uniform.harmonics = environment.harmonics.map(|[r, g, b]| [r, g, b, 0.0]);
         }
         if let Some(ground) = &lighting.ground {

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use spherule_tracer::render::PathSeed;
 
-use crate::lighting::{Model, source_count};
+use crate::lighting::{Detail, Lighting, Model, RayKinds};
 
 /// Largest number of lights.
 pub const MAX_LIGHTS: usize = 8;
@@ -20,6 +20,8 @@ pub struct Picture<'a> {
     pub samples: Samples<'a>,
     /// Whether the sums over every second sample are kept, for denoising.
     pub has_odd: bool,
+    /// Whether the first surface of each sample is kept, for Cryptomatte.
+    pub has_objects: bool,
     /// The transport of light.
     pub model: Model<'a>,
     /// Whitted's model: recursion depth; 1 is direct light only. Rays beyond see the background.
@@ -40,10 +42,29 @@ impl Picture<'_> {
         matches!(self.model, Model::Paths(_))
     }
 
+    /// The image of the environment at its own resolution.
+    pub(crate) fn detail(&self) -> Option<&Detail> {
+        let Model::Paths(lighting) = self.model else { return None };
+        lighting.environment.as_ref()?.detail.as_ref()
+    }
+
+    /// Whether indirect light has a limit.
+    pub(crate) const fn has_clamp(&self) -> bool {
+        matches!(self.model, Model::Paths(Lighting { indirect_limit: Some(_), .. }))
+    }
+
+    /// What its rays are.
+    pub(crate) fn ray_kinds(&self) -> RayKinds {
+        RayKinds {
+            has_paths: self.has_paths(),
+            has_mirrors: matches!(self.model, Model::Paths(Lighting { has_mirrors: true, .. })),
+            lights: u32::try_from(self.lights.len()).expect("at most MAX_LIGHTS"),
+        }
+    }
+
     /// Number of sources of shadow rays.
     pub(crate) fn sources(&self) -> u32 {
-        let lights = u32::try_from(self.lights.len()).expect("at most MAX_LIGHTS");
-        source_count(self.has_paths(), lights)
+        self.ray_kinds().sources()
     }
 
     /// Whether rays can hit a light.

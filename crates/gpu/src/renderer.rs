@@ -4,21 +4,23 @@
 use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
+use spherule_tracer::render::device::mirrors_see_through;
+use spherule_tracer::render::{IntegratorKind, RenderSettings};
+use spherule_tracer::scene::Scene;
 use wgpu::BindingResource;
 
 use crate::arrays::{Array, Download, Uniform, Uniforms};
-use crate::commands::{Commands, Kernel, Timer};
-use crate::lighting::{Lighting, Model, SceneUniform, ray_bytes, source_count};
+use crate::commands::{Commands, Timer};
+use crate::kernels::{Kernels, Variant};
+use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
 use crate::picture::{FilmSize, Picture, Samples, View};
-use crate::tree::{GROUPS, Spheres, TreeBuilder, TreeShape, tree_constants};
+use crate::tree::{Spheres, TreeBuilder, TreeShape};
 use crate::{Device, GpuError};
 
-/// Entries of the traversal's stack for each level of nodes: all children but the one that is visited next.
-const STACK_PER_LEVEL: u32 = 7;
-/// Levels that the shortest stack holds. Fewer levels do not make it faster.
-const MIN_STACK_LEVELS: u32 = 6;
 /// Invocations in a workgroup.
 const GROUP: u64 = 64;
+/// Counters of the light that is lost.
+const LOST_WORDS: usize = 2;
 /// Largest number of stages whose time is measured; pictures with more samples have several in a stage.
 const MAX_STAGES: u32 = 257;
 
@@ -29,6 +31,8 @@ pub enum Colors<'a> {
     Constant([f32; 3]),
     /// One for each sphere.
     PerSphere(&'a [[f32; 3]]),
+    /// One for each sphere, with its opacity: how much of what is behind it the sphere covers.
+    WithOpacity(&'a [[f32; 4]]),
 }
 
 /// The pixels of a picture, row by row.
@@ -40,6 +44,25 @@ pub struct Pixels<'a> {
     pub odd: &'a [[f32; 4]],
     /// The nearest sample.
     pub nearest: &'a [NearestSample],
+    /// The first surface of each sample, pixel by pixel, if the picture has them; else empty.
+    pub objects: &'a [SampleObject],
+}
+
+/// The first surface of a sample, in one word.
+#[repr(transparent)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct SampleObject(u32);
+
+impl SampleObject {
+    /// The index of its sphere, or None on the ground, with its coverage; None without a surface.
+    pub fn surface(self) -> Option<(Option<u32>, f32)> {
+        // Indices are below 2^31; the ground is its negative coverage
+        match self.0 {
+            NearestSample::NONE => None,
+            index if index >> 31 == 0 => Some((Some(index), 1.0)),
+            bits => Some((None, -f32::from_bits(bits))),
+        }
+    }
 }
 
 /// The nearest intersection of a pixel.
@@ -76,6 +99,8 @@ pub struct Cost {
     pub shadow_rays: u64,
     /// Reflected rays, also by rough surfaces.
     pub reflected_rays: u64,
+    /// Light that the clamp of indirect light took away, in the steps of `LostLight`.
+    pub lost_steps: u64,
     /// Memory of the device, bytes.
     pub bytes: u64,
     /// That of the tree and its build.
@@ -88,7 +113,7 @@ pub struct Cost {
 struct Stage {
     depth: u32,
     source: u32,
-    queues: u32,
+    counters: u32,
     zero: u32,
 }
 
@@ -98,85 +123,6 @@ struct Stage {
 struct Current {
     sample: u32,
     zeros: [u32; 3],
-}
-
-/// Kernels for trees of one kind.
-#[derive(Debug)]
-struct Kernels {
-    empty_queues: Kernel,
-    trace_camera: Kernel,
-    trace_next: Kernel,
-    trace_shadow: Kernel,
-}
-
-/// What the source of the kernels depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Variant {
-    /// Whether paths are traced.
-    has_paths: bool,
-    /// Whether radii are equal.
-    is_common: bool,
-    /// Levels that the stack holds.
-    levels: u32,
-}
-
-/// The sources of path tracing.
-const PATHS: [&str; 6] = [
-    include_str!("shaders/scene.wgsl"),
-    include_str!("shaders/sampler.wgsl"),
-    include_str!("shaders/environment.wgsl"),
-    include_str!("shaders/ground.wgsl"),
-    include_str!("shaders/bsdf.wgsl"),
-    include_str!("shaders/path.wgsl"),
-];
-const WHITTED: [&str; 1] = [include_str!("shaders/whitted.wgsl")];
-
-impl Kernels {
-    fn new(device: &Device, variant: Variant) -> Self {
-        let append = if device.has_subgroups() {
-            include_str!("shaders/append_subgroup.wgsl")
-        } else {
-            include_str!("shaders/append_atomic.wgsl")
-        };
-        let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
-        let source = [
-            device.arithmetic().source(),
-            &tree_constants(variant.is_common),
-            &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * variant.levels),
-            GROUPS,
-            include_str!("shaders/view.wgsl"),
-            include_str!("shaders/arithmetic.wgsl"),
-            include_str!("shaders/functions.wgsl"),
-            include_str!("shaders/traverse.wgsl"),
-            include_str!("shaders/camera.wgsl"),
-            include_str!("shaders/surface.wgsl"),
-            include_str!("shaders/lights.wgsl"),
-            include_str!("shaders/queues.wgsl"),
-            append,
-            &model.concat(),
-        ];
-        let module = device.module(&source.concat());
-        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
-        let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
-            [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18],
-                &[0, 1, 2, 6, 8, 11, 13, 15, 18],
-            ]
-        } else {
-            [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18],
-                &[0, 1, 2, 6, 8, 11, 13, 18],
-            ]
-        };
-        Self {
-            empty_queues: kernel("empty_queues", &[8, 13, 14]),
-            trace_camera: kernel("trace_camera", camera),
-            trace_next: kernel("trace_next", next),
-            trace_shadow: kernel("trace_shadow", shadow),
-        }
-    }
 }
 
 /// Renders one frame after another on a device, in memory that is kept.
@@ -189,6 +135,7 @@ pub struct Renderer {
     timer: Option<Timer>,
     download: Download,
     has_colors: bool,
+    has_opacity: bool,
     color: [f32; 3],
     /// The picture that was traced last.
     traced: Option<Traced>,
@@ -203,6 +150,7 @@ struct Traced {
     samples: u32,
     sources: u32,
     has_odd: bool,
+    has_objects: bool,
 }
 
 #[derive(Debug, Default)]
@@ -220,12 +168,14 @@ struct TraceArrays {
     sums: Array,
     texels: Array,
     constants: Array,
-    /// The version of the tables that these two hold.
+    detail: Array,
+    objects: Array,
+    /// The version of the tables that these three hold.
     tables: Option<u64>,
 }
 
 impl TraceArrays {
-    fn all(&self) -> [&Array; 12] {
+    fn all(&self) -> [&Array; 14] {
         let [rays, other_rays] = &self.rays;
         [
             &self.colors,
@@ -240,6 +190,8 @@ impl TraceArrays {
             &self.sums,
             &self.texels,
             &self.constants,
+            &self.detail,
+            &self.objects,
         ]
     }
 
@@ -247,19 +199,61 @@ impl TraceArrays {
     fn write_tables(&mut self, device: &Device, lighting: &Lighting) -> Result<(), GpuError> {
         let tables = &lighting.tables;
         if self.tables != Some(tables.version) {
+            self.tables = None;
             self.texels.write(device, "environment", bytemuck::cast_slice(&tables.texels))?;
             self.constants.write(device, "tables", bytemuck::cast_slice(&tables.constants))?;
+            let detail = lighting.environment.as_ref().and_then(|of| of.detail.as_ref());
+            let halves = detail.map_or(&[][..], |detail| detail.map.bits());
+            // Copies are whole words
+            let padded: Vec<u16>;
+            let halves = if halves.len().is_multiple_of(2) {
+                halves
+            } else {
+                padded = [halves, &[0]].concat();
+                &padded
+            };
+            let what = "the pixels of the environment (environment.detail)";
+            self.detail.write(device, what, bytemuck::cast_slice(halves))?;
             self.tables = Some(tables.version);
         }
         Ok(())
     }
 }
 
-/// Memory of the device for the film and the queues of each pixel with that many lights, bytes. `has_odd`: the sums over
-/// every second sample are kept.
-pub fn bytes_per_pixel(has_paths: bool, lights: u32, has_odd: bool) -> u64 {
-    let film = if has_odd { 32 } else { 16 };
-    4 + film + 32 + ray_bytes(has_paths) * (2 + u64::from(source_count(has_paths, lights)))
+/// Memory of the film for each pixel, bytes. `has_odd`: the sums over every second sample are kept.
+const fn film_bytes(has_odd: bool, has_clamp: bool) -> u64 {
+    16 * (1 + has_odd as u64 + has_clamp as u64)
+}
+
+/// Memory of the first surfaces of the samples of a pixel, bytes.
+const fn object_bytes(has_objects: bool, samples: u32) -> u64 {
+    if has_objects { 4 * samples as u64 } else { 0 }
+}
+
+/// What the rays of a picture of `scene` with these settings are, and the memory of the first surfaces of a pixel.
+fn needs_of(scene: &Scene, settings: &RenderSettings) -> (RayKinds, u64) {
+    let has_paths = settings.integrator == IntegratorKind::Path;
+    let rays = RayKinds {
+        has_paths,
+        has_mirrors: has_paths && mirrors_see_through(scene, settings),
+        lights: u32::try_from(scene.lights.len()).unwrap_or(u32::MAX),
+    };
+    (rays, object_bytes(settings.channels.mattes().next().is_some(), settings.samples))
+}
+
+/// The largest array for the pixels and rays of a picture, bytes.
+pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
+    let (rays, objects) = needs_of(scene, settings);
+    let shadows = rays.shadow_bytes() * u64::from(rays.sources());
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    shadows.max(rays.ray_bytes()).max(objects) * pixels
+}
+
+/// Memory of the device for the film and the queues of each pixel, bytes.
+pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
+    let (rays, objects) = needs_of(scene, settings);
+    let film = film_bytes(settings.has_features, rays.has_paths && settings.clamp.is_some());
+    4 + film + 32 + objects + 2 * rays.ray_bytes() + rays.shadow_bytes() * u64::from(rays.sources())
 }
 
 impl Renderer {
@@ -273,6 +267,7 @@ impl Renderer {
             timer: Timer::new(device, MAX_STAGES),
             download: Download::default(),
             has_colors: false,
+            has_opacity: false,
             color: [0.0; 3],
             traced: None,
             stages: 0,
@@ -292,17 +287,17 @@ impl Renderer {
         spheres: &Spheres<'_>,
         colors: Colors<'_>,
     ) -> Result<(), GpuError> {
-        match colors {
+        let bytes: &[u8] = match colors {
             Colors::Constant(color) => {
                 self.color = color;
-                self.arrays.colors.reserve(device, "colours", 0)?;
+                &[]
             }
-            Colors::PerSphere(colors) => {
-                let bytes = bytemuck::cast_slice(colors);
-                self.arrays.colors.write(device, "colours", bytes)?;
-            }
-        }
-        self.has_colors = matches!(colors, Colors::PerSphere(_));
+            Colors::PerSphere(colors) => bytemuck::cast_slice(colors),
+            Colors::WithOpacity(colors) => bytemuck::cast_slice(colors),
+        };
+        self.arrays.colors.write(device, "colours", bytes)?;
+        self.has_colors = !matches!(colors, Colors::Constant(_));
+        self.has_opacity = matches!(colors, Colors::WithOpacity(_));
         self.tree.build(device, spheres, self.timer.as_ref())
     }
 
@@ -329,11 +324,7 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         self.reserve(device, picture)?;
         let shape = *self.tree.shape();
-        let variant = Variant {
-            has_paths: picture.has_paths(),
-            is_common: shape.is_common,
-            levels: shape.levels.max(MIN_STACK_LEVELS),
-        };
+        let variant = Variant::of(picture, &shape, self.has_opacity);
         self.kernels.entry(variant).or_insert_with(|| Kernels::new(device, variant));
         let plan = self.plan(picture, &shape);
         self.uniforms.upload(device)?;
@@ -361,6 +352,7 @@ impl Renderer {
             samples: picture.samples.count,
             sources: picture.sources(),
             has_odd: picture.has_odd,
+            has_objects: picture.has_objects,
         });
         device.check()
     }
@@ -377,22 +369,27 @@ impl Renderer {
         device: &Device,
         store: impl FnOnce(&Pixels<'_>) -> T,
     ) -> Result<T, GpuError> {
-        let Traced { pixels, has_odd, .. } = self.traced.expect("a picture was traced");
-        let film = if has_odd { 32 * pixels } else { 16 * pixels };
-        self.download.reserve(device, film + 32 * pixels)?;
+        let Traced { pixels, samples, has_odd, has_objects, .. } =
+            self.traced.expect("a picture was traced");
+        let film = film_bytes(has_odd, false) * pixels;
+        let objects = object_bytes(has_objects, samples) * pixels;
+        self.download.reserve(device, film + 32 * pixels + objects)?;
         let mut commands = Commands::new(device);
         commands.copy(&self.arrays.film, &self.download, [0, film]);
         commands.copy(&self.arrays.data, &self.download, [film, 32 * pixels]);
+        commands.copy(&self.arrays.objects, &self.download, [film + 32 * pixels, objects]);
         commands.submit();
         self.download.with_content(device, |bytes| {
             #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
-            let (film, nearest) = bytes.split_at(film as usize);
-            #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
-            let (sums, odd) = film.split_at(16 * pixels as usize);
+            let [film, pixels, objects] = [film, pixels, objects].map(|length| length as usize);
+            let (film, others) = bytes.split_at(film);
+            let (sums, odd) = film.split_at(16 * pixels);
+            let (nearest, objects) = (&others[..32 * pixels], &others[32 * pixels..][..objects]);
             store(&Pixels {
                 sums: bytemuck::cast_slice(sums),
                 odd: bytemuck::cast_slice(odd),
                 nearest: bytemuck::cast_slice(nearest),
+                objects: bytemuck::cast_slice(objects),
             })
         })
     }
@@ -406,8 +403,9 @@ impl Renderer {
     /// Without a picture.
     pub fn cost(&self, device: &Device) -> Result<Cost, GpuError> {
         let Traced { pixels, samples, sources, .. } = self.traced.expect("a picture was traced");
+        let counts: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
+        let (lengths, lost) = counts.split_at(counts.len() - LOST_WORDS);
         // The first queue of each depth has reflected rays, the others shadow rays
-        let lengths: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
         let reflected = lengths.iter().step_by(1 + sources as usize).sum();
         let seconds = match &self.timer {
             Some(timer) => timer.seconds(device, self.stages)?,
@@ -420,6 +418,7 @@ impl Renderer {
             primary_rays: pixels * u64::from(samples),
             reflected_rays: reflected,
             shadow_rays: lengths.iter().sum::<u64>() - reflected,
+            lost_steps: lost[0].saturating_add(lost[1].saturating_mul(1 << 32)),
             bytes: self.tree.bytes() + arrays,
             tree_bytes: self.tree.bytes(),
         })
@@ -427,25 +426,27 @@ impl Renderer {
 
     fn reserve(&mut self, device: &Device, picture: &Picture<'_>) -> Result<(), GpuError> {
         let pixels = picture.film.pixels();
-        let sources = picture.sources();
-        let film = if picture.has_odd { 32 } else { 16 };
-        let ray = ray_bytes(picture.has_paths());
-        let queues = vec![0; queue_count(picture) as usize];
+        let rays = picture.ray_kinds();
+        let film = film_bytes(picture.has_odd, picture.has_clamp());
+        let counters = vec![0; counter_count(picture) as usize];
         let arrays = &mut self.arrays;
         arrays.film.reserve(device, "pixels", film * pixels)?;
         arrays.data.reserve(device, "pixels", 32 * pixels)?;
+        let objects = object_bytes(picture.has_objects, picture.samples.count);
+        arrays.objects.reserve(device, "objects of all samples", objects * pixels)?;
         for queue in &mut arrays.rays {
-            queue.reserve(device, "rays", ray * pixels)?;
+            queue.reserve(device, "rays", rays.ray_bytes() * pixels)?;
         }
-        arrays.shadows.reserve(device, "shadow rays", ray * pixels * u64::from(sources))?;
+        let shadows = rays.shadow_bytes() * u64::from(rays.sources());
+        arrays.shadows.reserve(device, "shadow rays", shadows * pixels)?;
         if let Model::Paths(lighting) = picture.model {
             arrays.write_tables(device, lighting)?;
         }
-        arrays.queued.write(device, "queues", bytemuck::cast_slice::<u32, u8>(&queues))?;
+        arrays.queued.write(device, "queues", bytemuck::cast_slice::<u32, u8>(&counters))?;
         arrays.sums.write(
             device,
             "counts",
-            bytemuck::cast_slice(&[&queues[..], &queues].concat()),
+            bytemuck::cast_slice(&[&counters[..], &counters].concat()),
         )?;
         // The pictures of a job have the same samples; other filters have other points
         let Samples { points, sets, .. } = picture.samples;
@@ -478,12 +479,12 @@ impl Renderer {
             Model::Whitted => None,
             Model::Paths(lighting) => Some(uniforms.push(&SceneUniform::from(lighting))),
         };
-        let queues = queue_count(picture);
+        let counters = counter_count(picture);
         let samples = 0..picture.samples.count;
         let samples = samples
             .map(|sample| uniforms.push(&Current { sample, ..Current::default() }))
             .collect();
-        let mut push = |stage: Stage| uniforms.push(&Stage { queues, ..stage });
+        let mut push = |stage: Stage| uniforms.push(&Stage { counters, ..stage });
         let mut all = |stages: &mut dyn Iterator<Item = Stage>| stages.map(&mut push).collect();
         let depths = 1..=depth_count(picture);
         let sources = 0..picture.sources();
@@ -491,7 +492,7 @@ impl Renderer {
             view,
             scene,
             film: picture.film,
-            queues,
+            counters,
             samples,
             depths: all(&mut depths.clone().map(|depth| Stage { depth, ..Stage::default() })),
             sources: depths
@@ -526,13 +527,16 @@ impl Renderer {
                 let array_of = |binding| self.array(binding, plan, [sample, *source], number);
                 commands.add(&kernels.trace_shadow, &array_of, pixels, GROUP);
             }
+            if let (Some(clamp), 1..) = (&kernels.clamp_indirect, number) {
+                commands.add(clamp, &array_of, pixels, GROUP);
+            }
         }
     }
 
     /// Adds the dispatch that empties the queues, and counts the rays that they had.
     fn add_count(&self, commands: &mut Commands<'_>, kernels: &Kernels, plan: &Plan) {
         let array_of = |binding| self.array(binding, plan, [plan.samples[0], plan.depths[0]], 0);
-        commands.add(&kernels.empty_queues, &array_of, plan.queues.into(), GROUP);
+        commands.add(&kernels.empty_queues, &array_of, plan.counters.into(), GROUP);
     }
 
     /// The argument of a kernel for a binding, in the dispatches of a depth: the queues of rays change places.
@@ -561,6 +565,8 @@ impl Renderer {
             14 => &arrays.sums,
             16 => &arrays.texels,
             17 => &arrays.constants,
+            19 => &arrays.detail,
+            20 => &arrays.objects,
             _ => return self.tree.traversal_array(binding).expect("1 to 3 are those of the tree"),
         };
         array.binding()
@@ -583,19 +589,28 @@ fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
         Model::Whitted => None,
         Model::Paths(lighting) => Some(lighting),
     };
-    // The lights are the last sources
-    let first = source_count(picture.has_paths(), 0);
-    match (source.checked_sub(first), scene) {
-        (Some(light), _) => picture.lights[light as usize].casts_shadow,
+    // The lights follow, then the environment and the lights of a catcher
+    let rays = picture.ray_kinds();
+    let lights = picture.lights;
+    match (source.checked_sub(rays.first_light()), scene) {
+        (Some(light), _) if light < rays.lights => lights[light as usize].casts_shadow,
+        (Some(light), Some(scene)) => match light - rays.lights {
+            0 => scene.environment.is_some(),
+            light => lights[light as usize - 1].casts_shadow,
+        },
+        (Some(_), None) => false,
         (None, Some(scene)) if scene.environment.is_none() => false,
         (None, Some(scene)) if source == 1 => depth > scene.bounces && !picture.has_extents(),
         (None, _) => true,
     }
 }
 
-/// Number of queues of a sample: for each depth, one of rays that go on, and one of shadow rays for each source.
-fn queue_count(picture: &Picture<'_>) -> u32 {
-    depth_count(picture) * (1 + picture.sources())
+/// Number of counters of a sample: the lengths of its queues, for each depth one of rays that go on, and one of shadow
+/// rays for each source; then the light that is lost.
+fn counter_count(picture: &Picture<'_>) -> u32 {
+    #[expect(clippy::cast_possible_truncation, reason = "it is 2")]
+    let lost = LOST_WORDS as u32;
+    depth_count(picture) * (1 + picture.sources()) + lost
 }
 
 /// The uniforms of a picture.
@@ -604,8 +619,8 @@ struct Plan {
     /// The lighting of paths.
     scene: Option<Uniform>,
     film: FilmSize,
-    /// Number of queues of a sample.
-    queues: u32,
+    /// Number of counters of a sample.
+    counters: u32,
     samples: Vec<Uniform>,
     depths: Vec<Uniform>,
     /// The sources of shadow rays of each depth.

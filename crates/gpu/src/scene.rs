@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
-    DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, mirrors_see_through, store_pixels,
+    DeviceHit, DeviceObject, DevicePixel, DevicePixels, Extent, extent_of, store_pixels, stores_all,
 };
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
@@ -46,20 +46,14 @@ pub enum Missing {
     LightExtent,
     /// More lights than [`MAX_LIGHTS`].
     Lights,
-    /// Channels that are not from the nearest sample.
+    /// Channels with parts of the light.
     Layers,
     /// Outlines and the fading with distance.
     Drawing,
     /// Particles that hide what is behind them.
     Holdout,
-    /// An image of the environment at its own resolution.
-    Detail,
-    /// A clamp of indirect light.
-    Clamp,
     /// A limit of noise.
     Noise,
-    /// Metal or plastic that sees the environment through a shadow catcher.
-    MirroredCatcher,
 }
 
 impl fmt::Display for Missing {
@@ -73,15 +67,10 @@ impl fmt::Display for Missing {
             Self::Panorama => "equirectangular pictures",
             Self::LightExtent => "lights with an extent in Whitted's model",
             Self::Lights => "more than eight lights",
-            Self::Layers => "layers of light and Cryptomatte",
+            Self::Layers => "layers of light",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
-            Self::Detail => "an image of the environment at its own resolution",
-            Self::Clamp => "a clamp of indirect light",
             Self::Noise => "a limit of noise",
-            Self::MirroredCatcher => {
-                "metal and plastic above a shadow catcher without a background"
-            }
         })
     }
 }
@@ -104,13 +93,10 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (camera.projection().is_panorama(), Missing::Panorama),
         (scene.lights.iter().any(has_extent) && is_whitted, Missing::LightExtent),
         (scene.lights.len() > MAX_LIGHTS, Missing::Lights),
-        (!are_from_nearest(&settings.channels), Missing::Layers),
+        (!stores_all(&settings.channels), Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
-        (scene.environment.as_ref().is_some_and(|map| map.has_detail()), Missing::Detail),
-        (settings.clamp.is_some() && !is_whitted, Missing::Clamp),
         (settings.noise.is_some(), Missing::Noise),
-        (mirrors_see_through(scene, settings) && !is_whitted, Missing::MirroredCatcher),
     ]
     .into_iter()
     .find_map(|(is_needed, missing)| is_needed.then_some(missing))
@@ -192,7 +178,8 @@ impl SceneRenderer {
         };
         let order = Order::Any(key_length(spheres.centers));
         let centers = Centers::Points(bytemuck::cast_slice(spheres.centers));
-        self.start(&Spheres { centers, radii, order }, spheres.centers.len(), source)
+        let keeps_copies = source.is_translucent();
+        self.start(&Spheres { centers, radii, order, keeps_copies }, spheres.centers.len(), source)
     }
 
     /// Same as [`Self::prepare`], of the leaves of a native frame, whose particles are in the order of a tree. `radius` is
@@ -226,7 +213,12 @@ impl SceneRenderer {
             }
         };
         let centers = Centers::Blocks { blocks: bytemuck::cast_slice(blocks), count: leaves.count };
-        let spheres = Spheres { centers, radii, order: Order::AlongCurve };
+        let spheres = Spheres {
+            centers,
+            radii,
+            order: Order::AlongCurve,
+            keeps_copies: source.is_translucent(),
+        };
         let count = usize::try_from(leaves.count).unwrap_or(usize::MAX);
         self.start(&spheres, count, source)
     }
@@ -237,14 +229,18 @@ impl SceneRenderer {
         count: usize,
         source: &dyn ShadeSource,
     ) -> Result<(), GpuError> {
-        let colors: Vec<Vec3>;
-        let colors = match source.constant_color() {
-            Some(color) => Colors::Constant(color.to_array()),
-            None => {
-                let count = u32::try_from(count).unwrap_or(u32::MAX);
-                colors = (0..count).into_par_iter().map(|index| source.color(index)).collect();
-                Colors::PerSphere(bytemuck::cast_slice(&colors))
-            }
+        let indices = (0..u32::try_from(count).unwrap_or(u32::MAX)).into_par_iter();
+        let each: Vec<Vec3>;
+        let with_opacity: Vec<Vec4>;
+        let colors = if source.is_translucent() {
+            let color = |index| source.color(index).extend(source.opacity(index));
+            with_opacity = indices.map(color).collect();
+            Colors::WithOpacity(bytemuck::cast_slice(&with_opacity))
+        } else if let Some(color) = source.constant_color() {
+            Colors::Constant(color.to_array())
+        } else {
+            each = indices.map(|index| source.color(index)).collect();
+            Colors::PerSphere(bytemuck::cast_slice(&each))
         };
         self.renderer.prepare(&self.device, spheres, colors)
     }
@@ -263,14 +259,8 @@ impl SceneRenderer {
     ) -> Result<Cost, SceneError> {
         self.trace(scene, source, settings, stop)?;
         let store = |pixels: &Pixels<'_>| {
-            let share = 1.0 / settings.samples as f32;
-            let odd_share = 1.0 / (settings.samples / 2).max(1) as f32;
-            let pixel = |number: usize| DevicePixel {
-                color: pixels.sums[number].map(|sum| sum * share),
-                odd: pixels.odd.get(number).copied().unwrap_or_default().map(|sum| sum * odd_share),
-                nearest: hit_of(&pixels.nearest[number]),
-            };
-            store_pixels(film, scene, source, settings, &pixel)
+            let pixels = SummedPixels { pixels: *pixels, samples: settings.samples };
+            store_pixels(film, scene, source, settings, &pixels)
         };
         self.renderer.read(&self.device, store)??;
         Ok(self.renderer.cost(&self.device)?)
@@ -317,6 +307,7 @@ impl SceneRenderer {
             background: background_of(&scene.background),
             is_transparent: settings.transparent_background,
             has_odd: settings.has_features,
+            has_objects: settings.channels.mattes().next().is_some(),
             model: match settings.integrator {
                 IntegratorKind::Whitted => Model::Whitted,
                 IntegratorKind::Path => Model::Paths(self.lighting.of(scene, source, settings)),
@@ -328,6 +319,32 @@ impl SceneRenderer {
     }
 }
 
+/// Pixels with their number of samples.
+struct SummedPixels<'a> {
+    pixels: Pixels<'a>,
+    samples: u32,
+}
+
+impl DevicePixels for SummedPixels<'_> {
+    fn pixel(&self, number: usize) -> DevicePixel {
+        let Pixels { sums, odd, nearest, .. } = self.pixels;
+        let share = 1.0 / self.samples as f32;
+        let odd_share = 1.0 / (self.samples / 2).max(1) as f32;
+        DevicePixel {
+            color: sums[number].map(|sum| sum * share),
+            odd: odd.get(number).copied().unwrap_or_default().map(|sum| sum * odd_share),
+            nearest: hit_of(&nearest[number]),
+        }
+    }
+
+    fn objects(&self, number: usize) -> impl Iterator<Item = DeviceObject> {
+        let samples = self.samples as usize;
+        let objects = &self.pixels.objects[samples * number..][..samples];
+        let surfaces = objects.iter().filter_map(|object| object.surface());
+        surfaces.map(|(particle, coverage)| DeviceObject { particle, coverage })
+    }
+}
+
 /// The rays that a picture has cost.
 pub const fn ray_counts(cost: &Cost) -> RayCounts {
     RayCounts {
@@ -335,7 +352,7 @@ pub const fn ray_counts(cost: &Cost) -> RayCounts {
         shadow: cost.shadow_rays,
         reflection: cost.reflected_rays,
         refraction: 0,
-        lost: LostLight::NONE,
+        lost: LostLight::from_steps(cost.lost_steps),
         samples: 0,
         noisy_pixels: 0,
     }

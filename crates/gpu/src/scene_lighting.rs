@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use spherule_tracer::render::device::{ambient_reach, light_on, reflected_by_white, rough_table};
+use spherule_tracer::render::device::{
+    ambient_reach, light_on, mirrors_see_through, reflected_by_white, rough_table,
+};
 use spherule_tracer::render::{IndirectLight, RenderSettings, ShadeSource};
 use spherule_tracer::scene::ground::Pattern;
 use spherule_tracer::scene::{self, Finish, Scene, environment::TableArrays};
@@ -72,6 +74,8 @@ impl SceneLighting {
         lighting.ground = scene.ground.as_ref().map(|ground| ground_of(ground, catcher));
         lighting.is_environment_visible = scene.is_environment_visible;
         lighting.bounces = settings.traced_bounces();
+        lighting.indirect_limit = settings.clamp;
+        lighting.has_mirrors = mirrors_see_through(scene, settings);
         lighting.ambient_reach = match settings.indirect {
             IndirectLight::Traced => None,
             IndirectLight::Ambient { radius } => Some(ambient_reach(radius)),
@@ -101,6 +105,8 @@ fn prepared(key: &Key) -> Lighting {
         finishes,
         bounces: 0,
         ambient_reach: None,
+        indirect_limit: None,
+        has_mirrors: false,
         is_environment_visible: false,
         tables,
     }
@@ -145,6 +151,9 @@ fn environment_of(environment: &scene::Environment, tables: &mut Tables) -> ligh
         axes: [axes.right, axes.back, axes.up].map(|axis| axis.to_array()),
         table,
         image,
+        detail: environment
+            .detail()
+            .map(|(map, scale)| lighting::Detail { map: Arc::clone(map), scale: scale.to_array() }),
         harmonics: environment.irradiance_harmonics().coefficients().map(|c| c.to_array()),
     }
 }

@@ -39,6 +39,8 @@ pub struct Spheres<'a> {
     pub radii: Radii<'a>,
     /// The order of the centres.
     pub order: Order,
+    /// Whether rays find all spheres with the same place and radius, instead of the first one.
+    pub keeps_copies: bool,
 }
 
 /// Centres of spheres.
@@ -123,6 +125,8 @@ pub(crate) struct TreeShape {
     pub(crate) padding: f32,
     /// Whether all spheres have the same radius.
     pub(crate) is_common: bool,
+    /// Whether all copies of a sphere are kept.
+    keeps_copies: bool,
     /// Number of spheres.
     pub(crate) count: u64,
     /// Whether the centres are in blocks.
@@ -141,6 +145,8 @@ struct Build {
     nodes: u32,
     first: u32,
     radius: f32,
+    keeps_copies: u32,
+    zeros: [u32; 3],
 }
 
 /// What kernels for keys depend on: the length, and whether centres are in blocks.
@@ -467,6 +473,7 @@ impl TreeBuilder {
             count: narrow(shape.count),
             children: narrow(blocks),
             radius: shape.radius,
+            keeps_copies: shape.keeps_copies.into(),
             ..Build::default()
         };
         step(Kind::GatherSpheres, side, build, blocks * BLOCK, 256);
@@ -574,7 +581,8 @@ fn shape_of(spheres: &Spheres<'_>) -> Result<TreeShape, GpuError> {
         return Err(GpuError::TooLarge { what: "particles", bytes, max });
     }
     let is_in_blocks = matches!(spheres.centers, Centers::Blocks { .. });
-    let mut shape = TreeShape { count, is_in_blocks, ..TreeShape::default() };
+    let keeps_copies = spheres.keeps_copies;
+    let mut shape = TreeShape { count, is_in_blocks, keeps_copies, ..TreeShape::default() };
     (shape.radius, shape.is_common) = match spheres.radii {
         Radii::Common(radius) => (radius, true),
         Radii::PerSphere(_) => (0.0, false),
@@ -672,7 +680,12 @@ mod tests {
                     let found = built(
                         &mut builder,
                         &device,
-                        &Spheres { centers: Centers::Points(&centers), radii, order },
+                        &Spheres {
+                            centers: Centers::Points(&centers),
+                            radii,
+                            order,
+                            keeps_copies: false,
+                        },
                     );
                     // Each place is visible, by its lowest index if copies follow each other
                     let bits = |i: &u32| centers[*i as usize].map(f32::to_bits);
@@ -707,8 +720,12 @@ mod tests {
         let given: Vec<u32> = (0..8192).collect();
         for length in [KeyLength::Short, KeyLength::Long, KeyLength::Longest] {
             let radii = Radii::Common(0.1);
-            let spheres =
-                Spheres { centers: Centers::Points(&centers), radii, order: Order::Any(length) };
+            let spheres = Spheres {
+                centers: Centers::Points(&centers),
+                radii,
+                order: Order::Any(length),
+                keeps_copies: false,
+            };
             assert!(
                 distance(&built(&mut builder, &device, &spheres)) < 0.1 * distance(&given),
                 "{length:?}"

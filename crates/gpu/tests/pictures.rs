@@ -7,10 +7,12 @@
 mod support;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
+use spherule_tracer::render::Stop;
 use spherule_tree::math::SimdLevel;
-use support::{Case, Data, Difference, Paths, Radii};
+use support::{Case, Data, Difference, Opacity, Paths, Radii};
 
 /// Half the distance of neighbouring 16-bit floats below 2, where the colours of these pictures are.
 const HALF_UNIT_OF_F16: f32 = 0.5 / 1024.0;
@@ -94,6 +96,73 @@ fn paths_are_those_of_the_cpu() {
     }
 }
 
+/// Rays end at the same spheres, which random numbers choose; shadow rays lose the same part of their light.
+#[test]
+fn opacities_are_those_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    let small = Case { opacity: Some(Opacity::Common(0.4)), ..Case::small() };
+    for case in [
+        small,
+        Case { opacity: Some(Opacity::Each), is_mapped: true, is_studio: true, ..small },
+        Case { opacity: Some(Opacity::Common(0.0)), ..small },
+        Case { opacity: Some(Opacity::Style(0.3)), ..small },
+        Case { radii: Radii::Each, data: Data::Clusters, seed: 3, ..small },
+        Case { data: Data::Coincident, particles: 50, ..small },
+    ] {
+        assert_equal(&case, &support::compare(&mut renderer, &case, level));
+    }
+    for paths in [Paths::Matte, Paths::Metal, Paths::Catcher, Paths::Lights] {
+        let case = Case { paths: Some(paths), particles: 400, samples: 5, ..small };
+        for opacity in [Opacity::Common(0.4), Opacity::Each, Opacity::Style(0.3)] {
+            let case = Case { opacity: Some(opacity), ..case };
+            let found = support::compare(&mut renderer, &case, level);
+            let Difference { ids, depths, mean, bias, odd, ray_ratio, .. } = found;
+            assert_eq!([ids, depths], [0; 2], "{case:?}");
+            assert!(mean.max(bias).max(odd) < 1e-3, "{case:?}: {found:?}");
+            assert!((ray_ratio - 1.0).abs() < 1e-3, "{case:?}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn indirect_light_has_the_limit_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    for paths in [Paths::Plastic, Paths::Mirrors, Paths::Coats, Paths::Lights, Paths::Ambient] {
+        let clamp = Some(0.1);
+        let case = Case { paths: Some(paths), samples: 5, particles: 400, clamp, ..Case::small() };
+        let found = support::compare(&mut renderer, &case, level);
+        let Difference { ids, depths, mean, bias, odd, lost: [lost, expected], .. } = found;
+        assert_eq!([ids, depths], [0; 2], "{paths:?}");
+        assert!(mean.max(bias).max(odd) < 1e-3, "{paths:?}: {found:?}");
+        assert!(expected > 1e-3 && (lost / expected - 1.0).abs() < 1e-3, "{paths:?}: {found:?}");
+    }
+    // A limit that nothing reaches takes nothing
+    let case = Case { paths: Some(Paths::Metal), clamp: Some(1e6), ..Case::small() };
+    assert_eq!(support::film(&mut renderer, &case).1.lost_steps, 0);
+}
+
+/// Also parts of pixels that the ground covers.
+#[test]
+fn mattes_are_those_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    let whitted = Case { has_mattes: true, samples: 8, particles: 400, ..Case::small() };
+    for case in [
+        whitted,
+        Case { paths: Some(Paths::Metal), opacity: Some(Opacity::Style(0.5)), ..whitted },
+        Case { paths: Some(Paths::Catcher), ..whitted },
+        Case { paths: Some(Paths::Lights), ..whitted },
+    ] {
+        let found = support::compare(&mut renderer, &case, level);
+        assert_eq!([found.ids, found.mattes], [0; 2], "{case:?}");
+    }
+}
+
 #[test]
 fn every_run_gives_the_same_bytes() {
     let Some(device) = device(Checks::Off) else { return };
@@ -129,8 +198,39 @@ fn more_than_an_array_holds_is_refused() {
 fn a_raised_flag_stops_a_picture() {
     let Some(device) = device(Checks::Off) else { return };
     let mut renderer = SceneRenderer::new(Arc::new(device));
-    let error = support::stopped(&mut renderer, &Case::small()).unwrap_err();
+    let error =
+        support::stopped(&mut renderer, &Case::small(), &AtomicBool::new(true)).unwrap_err();
     assert_eq!(error.to_string(), "interrupted");
+}
+
+/// Loses the device when it is asked for the second time, in the middle of a picture.
+struct Loss(Arc<Device>, AtomicU32);
+
+impl Stop for Loss {
+    fn is_raised(&self) -> bool {
+        if self.1.fetch_add(1, Ordering::Relaxed) == 1 {
+            self.0.destroy();
+        }
+        false
+    }
+}
+
+#[test]
+fn a_lost_device_fails_pictures() {
+    let Some(device) = device(Checks::Off) else { return };
+    let device = Arc::new(device);
+    let mut renderer = SceneRenderer::new(Arc::clone(&device));
+    let case = Case { samples: 4, ..Case::small() };
+    let loss = Loss(Arc::clone(&device), AtomicU32::new(0));
+    let expected = format!("{} was lost: ", device.adapter().name);
+    // It stays lost: also the next picture fails, and so does the first one of another renderer
+    for _ in 0..2 {
+        let error = support::stopped(&mut renderer, &case, &loss).unwrap_err().to_string();
+        assert!(error.starts_with(&expected), "{error}");
+    }
+    let mut renderer = SceneRenderer::new(Arc::clone(&device));
+    let error = support::stopped(&mut renderer, &case, &loss).unwrap_err().to_string();
+    assert!(error.starts_with(&expected), "{error}");
 }
 
 #[test]

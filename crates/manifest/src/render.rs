@@ -230,9 +230,10 @@ section! {
         /// What renders the images: auto | cpu | gpu
         ///
         /// gpu needs a program that was built with it, and a GPU with Vulkan (see `spherule devices`). It renders
-        /// opaque spheres; a setting that it lacks is an error that names its key. Ids, depths, normals and positions
-        /// equal those of the CPU; colours may differ in their last bits. auto is gpu where that is possible and the GPU
-        /// is no program on the CPU; else a note has the first reason. A job goes on with the device that it began with.
+        /// matte, plastic and metal spheres; a setting that it lacks is an error that names its key. Ids, depths, normals
+        /// and positions equal those of the CPU; colours may differ in their last bits. auto is gpu where that is possible
+        /// and the GPU is no program on the CPU; else a note has the first reason. A job goes on with the device that it
+        /// began with.
         device: DeviceSetting = DeviceSetting::Auto, affects(Affects::Nothing), flag("device", "NAME", "Job");
         /// Acceleration structure: auto, lbvh, kdtree, bvh or sbvh
         ///

@@ -9,10 +9,12 @@ use rayon::prelude::*;
 use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
 use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{
-    Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, ParticleShading,
-    RayCounts, RenderSettings, render,
+    Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, Opacities,
+    ParticleShading, RayCounts, RenderSettings, Stop, StyleShading, render,
 };
-use spherule_tracer::scene::environment::{self, Environment, EnvironmentAxes};
+use spherule_tracer::scene::environment::{
+    self, DetailMap, Environment, EnvironmentAxes, RadianceMap,
+};
 use spherule_tracer::scene::ground::{Ground, Pattern};
 use spherule_tracer::scene::{
     Background, Camera, CameraView, ColorMap, Finish, Lens, Light, LightKind, MaterialId,
@@ -50,6 +52,17 @@ pub(crate) enum Radii {
     Each,
 }
 
+/// Opacities of particles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Opacity {
+    /// All equal.
+    Common(f32),
+    /// From 0 to 1, of some exactly that.
+    Each,
+    /// Those of the second half, which are a style.
+    Style(f32),
+}
+
 /// What pictures of path tracing have beside the studio around the particles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Paths {
@@ -71,10 +84,16 @@ pub(crate) enum Paths {
     Ambient,
     /// A lens.
     Lens,
+    /// Metal and plastic ones, which see the environment through a shadow catcher, before it or on a transparent
+    /// background.
+    Mirrors,
+    Coats,
+    /// Smooth metal under an image of an odd size, which is seen at its own resolution.
+    Detail,
 }
 
 impl Paths {
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Matte,
         Self::Look,
         Self::Plastic,
@@ -84,6 +103,9 @@ impl Paths {
         Self::Lights,
         Self::Ambient,
         Self::Lens,
+        Self::Mirrors,
+        Self::Coats,
+        Self::Detail,
     ];
 }
 
@@ -109,6 +131,12 @@ pub(crate) struct Case {
     pub(crate) window: Option<[i32; 2]>,
     /// Path tracing; else Whitted's model.
     pub(crate) paths: Option<Paths>,
+    /// Opacities: one, or by an attribute.
+    pub(crate) opacity: Option<Opacity>,
+    /// Cryptomatte, on a transparent background.
+    pub(crate) has_mattes: bool,
+    /// Limit of indirect light.
+    pub(crate) clamp: Option<f32>,
 }
 
 impl Case {
@@ -128,6 +156,9 @@ impl Case {
             is_studio: false,
             window: None,
             paths: None,
+            opacity: None,
+            has_mattes: false,
+            clamp: None,
         }
     }
 
@@ -143,7 +174,8 @@ impl Case {
 
     /// The settings of the picture.
     pub(crate) fn settings(&self) -> RenderSettings {
-        let names = ["RGBA", "Z", "N", "P", "V", "id"];
+        let names = ["RGBA", "Z", "N", "P", "V", "id", "cryptomatte"];
+        let names = if self.has_mattes { &names[..] } else { &names[..6] };
         let is_ambient = self.paths == Some(Paths::Ambient);
         RenderSettings {
             integrator: match self.paths {
@@ -156,11 +188,13 @@ impl Case {
                 IndirectLight::Traced
             },
             has_features: self.paths.is_some(),
-            transparent_background: self.paths == Some(Paths::Catcher),
+            transparent_background: self.has_mattes
+                || matches!(self.paths, Some(Paths::Catcher | Paths::Coats)),
             samples: self.samples,
             seed: self.seed,
             max_depth: self.max_depth,
-            channels: Channels::from_names(names).expect("known names"),
+            clamp: self.clamp,
+            channels: Channels::from_names(names.iter().copied()).expect("known names"),
             window: self.window.map(|[left, top]| DataWindow {
                 image: [self.width, self.height],
                 left,
@@ -237,7 +271,7 @@ impl Particles {
                 .collect(),
             common,
             radii,
-            values: if case.is_mapped {
+            values: if case.is_mapped || case.opacity == Some(Opacity::Each) {
                 (0..count).map(|particle| uniform(8 * particle + 7)).collect()
             } else {
                 Vec::new()
@@ -283,6 +317,20 @@ pub(crate) fn scene(case: &Case, angle: f64) -> Scene {
     scene
 }
 
+/// An image with details that are smaller than the pixels of environments.
+fn detailed_map() -> RadianceMap {
+    let (width, height) = (1501, 751);
+    let pixel = |i: usize| {
+        let square = i % width / 3 + i / width / 3;
+        Vec3::new(
+            if square.is_multiple_of(2) { 1.5 } else { 0.1 },
+            0.5,
+            (i % width) as f32 / 1501.0,
+        )
+    };
+    RadianceMap::new(width, height, (0..width * height).map(pixel).collect()).expect("a valid size")
+}
+
 fn path_scene(paths: Paths, camera: Camera) -> Scene {
     let bounds =
         spherule_tracer::scene::Bounds { min: LOW.as_dvec3(), max: (LOW + SIZE).as_dvec3() };
@@ -294,14 +342,20 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
         Paths::Plastic => Some(Environment::from_fn(axes, |d| {
             0.5 + 0.5 * d + 20.0 * f32::from(d.x > 0.9) * Vec3::ONE
         })),
+        Paths::Detail => {
+            let detail = DetailMap::of(&detailed_map()).map(std::sync::Arc::new);
+            let environment = Environment::from_map(axes, &detailed_map(), Vec3::ONE);
+            Some(environment.with_detail(detail, Vec3::new(1.0, 0.9, 1.2)))
+        }
         _ => Some(environment::studio(axes, Vec3::ONE)),
     };
     scene.environment = environment.map(std::sync::Arc::new);
-    scene.is_environment_visible = paths == Paths::Plastic;
+    scene.is_environment_visible = matches!(paths, Paths::Plastic | Paths::Mirrors | Paths::Detail);
     scene.background = Background::Studio { up: Vec3::Z };
     let finish = match paths {
-        Paths::Plastic => Finish::Plastic { roughness: 0.4 },
-        Paths::Metal => Finish::Metal { roughness: 0.3 },
+        Paths::Plastic | Paths::Coats => Finish::Plastic { roughness: 0.4 },
+        Paths::Metal | Paths::Mirrors => Finish::Metal { roughness: 0.3 },
+        Paths::Detail => Finish::Metal { roughness: 0.05 },
         _ => Finish::Matte,
     };
     scene.materials[MaterialId::PARTICLES.index()].finish = finish;
@@ -314,7 +368,7 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
             scene.ground =
                 Some(Ground { pattern: checker, fade_start: 1.0, fade_end: 3.0, ..ground });
         }
-        Paths::Look | Paths::Catcher | Paths::Backdrop => {
+        Paths::Look | Paths::Catcher | Paths::Backdrop | Paths::Mirrors | Paths::Coats => {
             scene.ground = Some(ground.into_shadow_catcher(0.8))
         }
         Paths::Lights => {
@@ -331,7 +385,7 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
         }
         _ => {}
     }
-    if paths == Paths::Catcher {
+    if matches!(paths, Paths::Catcher | Paths::Mirrors | Paths::Coats) {
         let to_light = Vec3::new(-0.4, -0.3, 0.8).normalize();
         let kind = LightKind::Sun { to_light, half_angle: 0.02 };
         scene.lights.push(light(kind, Vec3::splat(2.0)));
@@ -353,6 +407,8 @@ pub(crate) struct Difference {
     pub(crate) normals: usize,
     pub(crate) positions: usize,
     pub(crate) coverages: usize,
+    /// Pixels with other objects of Cryptomatte.
+    pub(crate) mattes: usize,
     /// The largest difference of a colour.
     pub(crate) color: f32,
     /// The mean of the differences of colours, relative to the mean colour; and that of their sums over all pixels.
@@ -364,16 +420,35 @@ pub(crate) struct Difference {
     pub(crate) rays: bool,
     /// Rays to other surfaces and to lights, relative to those of the CPU.
     pub(crate) ray_ratio: f64,
+    /// The part of the light that a clamp takes away, here and on the CPU.
+    pub(crate) lost: [f64; 2],
 }
 
-fn shading<'a>(particles: &'a Particles, map: &'a ColorMap) -> ParticleShading<'a> {
+fn shading<'a>(case: &Case, particles: &'a Particles, map: &'a ColorMap) -> ParticleShading<'a> {
     let color = Vec3::new(0.6, 0.7, 0.9);
-    let colors = if particles.values.is_empty() {
-        Colors::Constant(color)
-    } else {
-        Colors::Mapped { values: &particles.values, map }
-    };
-    ParticleShading { colors, ..ParticleShading::constant(color) }
+    let values = &particles.values[..];
+    ParticleShading {
+        colors: if case.is_mapped {
+            Colors::Mapped { values, map }
+        } else {
+            Colors::Constant(color)
+        },
+        opacities: match case.opacity {
+            Some(Opacity::Common(opacity)) => Opacities::Constant(opacity),
+            Some(Opacity::Each) => Opacities::Mapped { values, range: [0.2, 0.9] },
+            Some(Opacity::Style(_)) | None => Opacities::Constant(1.0),
+        },
+        styles: match case.opacity {
+            Some(Opacity::Style(opacity)) => vec![StyleShading {
+                first: u32::try_from(case.particles / 2).expect("few particles"),
+                material: MaterialId::PARTICLES,
+                colors: Colors::Constant(Vec3::new(0.9, 0.3, 0.2)),
+                opacities: Opacities::Constant(opacity),
+            }],
+            _ => Vec::new(),
+        },
+        ..ParticleShading::constant(color)
+    }
 }
 
 fn color_map() -> ColorMap {
@@ -383,13 +458,13 @@ fn color_map() -> ColorMap {
 /// Copies the particles of `case` to the device.
 pub(crate) fn prepare(renderer: &mut SceneRenderer, case: &Case) -> Result<(), GpuError> {
     let particles = Particles::new(case);
-    renderer.prepare(&particles.spheres(), &shading(&particles, &color_map()))
+    renderer.prepare(&particles.spheres(), &shading(case, &particles, &color_map()))
 }
 
 /// The film of the device.
 pub(crate) fn film(renderer: &mut SceneRenderer, case: &Case) -> (Film, Cost) {
     let (particles, map) = (Particles::new(case), color_map());
-    film_of(renderer, case, &particles, &shading(&particles, &map), 0.0)
+    film_of(renderer, case, &particles, &shading(case, &particles, &map), 0.0)
 }
 
 pub(crate) fn film_of(
@@ -408,14 +483,17 @@ pub(crate) fn film_of(
     (film, cost)
 }
 
-/// A picture that is stopped from the start.
-pub(crate) fn stopped(renderer: &mut SceneRenderer, case: &Case) -> Result<Cost, SceneError> {
+/// A picture that `stop` may stop.
+pub(crate) fn stopped(
+    renderer: &mut SceneRenderer,
+    case: &Case,
+    stop: &dyn Stop,
+) -> Result<Cost, SceneError> {
     let (particles, map) = (Particles::new(case), color_map());
-    let shading = shading(&particles, &map);
+    let shading = shading(case, &particles, &map);
     renderer.prepare(&particles.spheres(), &shading)?;
-    let raised = AtomicBool::new(true);
     let mut film = Film::default();
-    renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), &raised)
+    renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), stop)
 }
 
 /// The film of the CPU, traced with the kernels of `level`.
@@ -437,7 +515,7 @@ pub(crate) fn film_of_cpu(
 /// Renders `case` on both, and compares all planes.
 pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLevel) -> Difference {
     let (particles, map) = (Particles::new(case), color_map());
-    let shading = shading(&particles, &map);
+    let shading = shading(case, &particles, &map);
     let (found, cost) = film_of(renderer, case, &particles, &shading, 0.0);
     let (expected, rays) = film_of_cpu(case, &particles, &shading, level);
     let differing = |plane, components: usize| {
@@ -465,7 +543,17 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
         mean: sum(&distance) / total,
         bias: (sum(&|a, _| rgb(a)) / total - 1.0).abs(),
         odd: odd.map(|(a, b)| distance(&a, &b)).sum::<f64>() / total,
+        lost: [(&found, ray_counts(&cost)), (&expected, rays)]
+            .map(|(film, rays)| rays.lost.part(&film.color, case.samples)),
         ray_ratio: secondary(ray_counts(&cost)) / secondary(rays).max(1.0),
+        mattes: if case.has_mattes {
+            let levels = 2 * usize::from(case.settings().channels.layers.matte_levels);
+            let kinds =
+                [FilmPlane::CryptoParticle, FilmPlane::CryptoMaterial, FilmPlane::CryptoPart];
+            kinds.into_iter().map(|plane| differing(plane, levels)).sum()
+        } else {
+            0
+        },
         ids: differing(FilmPlane::Id, 1),
         depths: differing(FilmPlane::Depth, 1),
         normals: differing(FilmPlane::Normal, 3),

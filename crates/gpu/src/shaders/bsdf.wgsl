@@ -136,6 +136,16 @@ fn eval_bsdf(finish: Finish, base: vec3<f32>, n: vec3<f32>, out: vec3<f32>, into
   return rough_value(finish, base, leaving_along(out, n), to_local(into, n));
 }
 
+// The part of the reflected light that the matte base of a surface reflects
+fn diffuse_fraction(finish: Finish, base: vec3<f32>, n: vec3<f32>, out: vec3<f32>, into: vec3<f32>) -> vec3<f32> {
+  if (finish.kind != PLASTIC) { return vec3<f32>(select(1.0, 0.0, finish.kind == METAL)); }
+  let along = leaving_along(out, n);
+  let local = to_local(into, n);
+  let value = rough_value(finish, base, along, local).xyz;
+  let coat = rough_value(finish, vec3<f32>(0.0), along, local).x;
+  return select(vec3<f32>(1.0), (value - coat) / value, value > vec3<f32>(0.0));
+}
+
 struct BsdfSample { direction: vec3<f32>, weight: vec3<f32>, pdf: f32 }
 
 // A direction from which light may arrive; its weight is the BSDF times the cosine over the density.

@@ -6,7 +6,10 @@
 // Cumulative probabilities of tables, and tables of materials
 @group(0) @binding(17) var<storage, read> constants: array<f32>;
 
-// Size of the image
+// The image at its own resolution (HAS_DETAIL): half floats, three a pixel, two in a word. Its middle column is in front
+@group(0) @binding(19) var<storage, read> detail: array<u32>;
+
+// Size of the image without detail
 const COLUMNS: u32 = 512u;
 const ROWS: u32 = 256u;
 // Rays with a density above this part of the texels per steradian see the image
@@ -82,26 +85,36 @@ fn texel_at(table: Table, own: vec3<f32>) -> vec4<f32> {
   return texels[table.records + cell.y * table.side + cell.x];
 }
 
+fn detail_number(i: u32) -> f32 { return unpack2x16float(detail[i >> 1u])[i & 1u]; }
+
 fn image_pixel(row: u32, column: u32) -> vec3<f32> {
+  if (HAS_DETAIL) {
+    let at = 3u * (row * scene.detail_size.x + column);
+    return vec3<f32>(detail_number(at), detail_number(at + 1u), detail_number(at + 2u));
+  }
   return texels[scene.image + row * COLUMNS + column].xyz;
 }
 
 // The radiance in the image, bilinear between the centres of pixels
 fn image_at(own: vec3<f32>) -> vec3<f32> {
-  let turns = angle_of(own.y, own.x) * (0.5 * INVERSE_PI);
-  let x = select(turns, turns + 1.0, turns < 0.0) * f32(COLUMNS) + 0.5;
-  let y = arc_cosine(clamp(own.z, -1.0, 1.0)) * (INVERSE_PI * f32(ROWS)) + 0.5;
-  let column = min(u32(x), COLUMNS);
-  let row = min(u32(y), ROWS);
+  let size = select(vec2<u32>(COLUMNS, ROWS), scene.detail_size, HAS_DETAIL);
+  var turns = angle_of(own.y, own.x) * (0.5 * INVERSE_PI);
+  if (HAS_DETAIL) { turns -= 0.25; }
+  let x = select(turns, turns + 1.0, turns < 0.0) * f32(size.x) + 0.5;
+  let y = arc_cosine(clamp(own.z, -1.0, 1.0)) * (INVERSE_PI * f32(size.y)) + 0.5;
+  let column = min(u32(x), size.x);
+  let row = min(u32(y), size.y);
   let across = x - f32(column);
   let down = y - f32(row);
-  let left = (column + COLUMNS - 1u) % COLUMNS;
-  let right = column % COLUMNS;
+  let left = (column + size.x - 1u) % size.x;
+  let right = column % size.x;
   let upper = max(row, 1u) - 1u;
-  let lower = min(row, ROWS - 1u);
+  let lower = min(row, size.y - 1u);
   let above = image_pixel(upper, left) * (1.0 - across) + image_pixel(upper, right) * across;
   let below = image_pixel(lower, left) * (1.0 - across) + image_pixel(lower, right) * across;
-  return above * (1.0 - down) + below * down;
+  let seen = above * (1.0 - down) + below * down;
+  if (HAS_DETAIL) { return scene.detail_scale * seen; }
+  return seen;
 }
 
 // The weight of a direction sampled with a density that could have been sampled with another one.

@@ -51,8 +51,8 @@ fn write_box(i: u32, low: vec3<f32>, high: vec3<f32>) {
 }
 
 // Boxes of blocks: of the centres with a common radius, which rays add later, otherwise of the spheres. No ray sees a copy
-// of the sphere before it, which has the lower index; without this rule, rays would test all particles of a place. The box
-// of a block that has nothing else is empty: its lowest corner is above the highest one.
+// of the sphere before it, which has the lower index; without this rule, rays would test all opaque particles of a place. The
+// box of a block that has nothing else is empty: its lowest corner is above the highest one.
 @compute @workgroup_size(256)
 fn block_boxes(
   @builtin(workgroup_id) group: vec3<u32>,
@@ -73,7 +73,8 @@ fn block_boxes(
   var high = vec3<f32>(-LARGEST);
   for (var j = 0u; j < BLOCK; j++) {
     let sphere = spheres[first + j];
-    let is_copy = all(sphere.xyz == before.xyz) && (COMMON_RADIUS || sphere.w == before.w);
+    let is_equal = all(sphere.xyz == before.xyz) && (COMMON_RADIUS || sphere.w == before.w);
+    let is_copy = is_equal && build.keeps_copies == 0u;
     before = sphere;
     if (is_copy) { spheres[first + j] = vec4<f32>(vec3<f32>(NOWHERE), sphere.w); }
     if (is_copy || sphere.x == NOWHERE) { continue; }

@@ -1,16 +1,17 @@
-// Path tracing of opaque spheres on a ground, as the CPU's integrator, with the same random numbers.
+// Path tracing of spheres on a ground, as the CPU's integrator, with the same random numbers.
 //
 // At each point of a surface, a direction is sampled from the environment and one from the BSDF, weighted by the balance
 // heuristic, and each light is sampled. The path goes on in the direction of the BSDF; from the third reflection on it
 // ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights.
 //
-// A ray that goes on has its direction and density, and its throughput beside its origin. A shadow ray has its direction
-// and length, and its radiance. A shadow ray from a shadow catcher takes light away if it is blocked, and adds coverage.
+// A ray that goes on has its direction and density, and its throughput beside its origin; also the diffuse part of that
+// if mirrors see the environment through a shadow catcher (HAS_MIRRORS). A shadow ray has its direction and length, and
+// its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage.
 
-const RAY: u32 = 3u;
+const RAY: u32 = select(3u, 4u, HAS_MIRRORS);
 const SHADOW: u32 = 3u;
 
-// Sources of shadow rays; those of the lights follow
+// Sources of shadow rays; those of the lights follow, then those of a catcher that mirrors see
 const OF_ENVIRONMENT: u32 = 0u;
 const OF_LAST: u32 = 1u;
 const FIRST_LIGHT: u32 = 2u;
@@ -25,10 +26,14 @@ const MAX_CONTINUATION: f32 = 0.95;
 // The part of the light that arrives at a second surface far away, for ambient light
 const MAX_AMBIENT: f32 = 0.8;
 
+// Steps of a unit of radiance in which the light that a clamp takes away is counted, and the largest count
+const LOST_STEPS: f32 = 4096.0;
+const MAX_LOST: f32 = 1.8e19;
+
 const LUMINANCE: vec3<f32> = vec3<f32>(0.2126, 0.7152, 0.0722);
 
-// A path up to a ray
-struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32> }
+// A path up to a ray. `diffuse` is the part of its throughput from the diffuse reflection before.
+struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32>, diffuse: vec3<f32> }
 
 // A point of an opaque surface
 struct Vertex { normal: vec3<f32>, start: vec3<f32>, base: vec3<f32>, out: vec3<f32>, finish: Finish }
@@ -47,16 +52,6 @@ fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
     shadows[SHADOW * place + 1u] = vec4<f32>(shadow.direction, shadow.length);
     shadows[SHADOW * place + 2u] = vec4<f32>(shadow.radiance, shadow.coverage);
   }
-}
-
-// The seed of the random numbers of a pixel after a number of reflections: to find it again costs less than to keep it
-// in queues
-fn seed_at(pixel: u32, bounces: u32) -> Wide {
-  let x = i32(pixel % view.width) + view.corner.x;
-  let y = i32(pixel / view.width) + view.corner.y;
-  var seed = seed_of_pixel(u32(x), u32(y)) ^ view.sequence;
-  for (var i = 0u; i < bounces; i++) { seed = child_of(seed, BOUNCED); }
-  return seed;
 }
 
 // The light of a sample that a surface reflects. `competes`: rays of the BSDF find that light, too.
@@ -110,10 +105,20 @@ fn seen_behind(ray: Ray, on_film: vec2<f32>) -> vec3<f32> {
   return environment_along(ray.direction, FAR);
 }
 
-// The shadow rays of a shadow catcher: what is blocked darkens the background by its part of the whole light.
-fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed: Wide) {
+// The source of the shadow rays of a catcher to the environment (0) and to lights (from 1 on). A glossy reflection of a
+// catcher needs its own, because its diffuse part is shaded, too.
+fn catcher_source(number: u32) -> u32 {
+  if (HAS_MIRRORS) { return FIRST_LIGHT + view.light_count + number; }
+  return select(FIRST_LIGHT + number - 1u, OF_ENVIRONMENT, number == 0u);
+}
+
+// The shadow rays of a shadow catcher: what is blocked darkens what is `behind` by its part of the whole light, and by
+// `darkness` at most.
+fn catch_shadows(
+  is_caught: bool, ground: GroundHit, ray: Ray, behind: vec3<f32>, darkness: f32, pixel: u32, seed: Wide,
+) {
   let white = Vertex(scene.ground_up, above_ground(ground), vec3<f32>(1.0), -ray.direction, OF_GROUND);
-  let darkness = scene.catcher_strength * ground.opacity;
+  let covers = select(vec3<f32>(0.0), LUMINANCE, stage.depth == 1u);
   // The light that arrives if nothing is in the way
   var whole = scene.catcher_whole;
   if (is_caught) {
@@ -121,7 +126,6 @@ fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed:
       whole += reflected(white, vec3<f32>(1.0), sample_source(number, white, seed), false);
     }
   }
-  let behind = seen_behind(ray, path.on_film);
   let part = select(vec3<f32>(0.0), darkness / whole, whole > vec3<f32>(0.0));
   // A ray to each source
   var shadow = no_shadow();
@@ -129,18 +133,18 @@ fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed:
     let sample = sample_table(scene.catcher, numbers_2d(seed, ENVIRONMENT, current.sample));
     let lost = sample.radiance * (INVERSE_PI / sample.pdf) * part;
     let is_above = dot(sample.direction, white.normal) > 0.0;
-    shadow = Shadow(is_above, white.start, sample.direction, FAR, -lost * behind, dot(lost, LUMINANCE));
+    shadow = Shadow(is_above, white.start, sample.direction, FAR, -lost * behind, dot(lost, covers));
   }
-  push_shadow(OF_ENVIRONMENT, shadow, path.pixel);
+  push_shadow(catcher_source(0u), shadow, pixel);
   for (var number = 0u; number < view.light_count; number++) {
     shadow = no_shadow();
     if (is_caught && view.lights[number].casts_shadow == 1u) {
       let light = sample_source(number, white, seed);
       let lost = reflected(white, vec3<f32>(1.0), light, false) * part;
       let is_needed = largest_of(lost) > 0.0;
-      shadow = Shadow(is_needed, white.start, light.direction, light.distance, -lost * behind, dot(lost, LUMINANCE));
+      shadow = Shadow(is_needed, white.start, light.direction, light.distance, -lost * behind, dot(lost, covers));
     }
-    push_shadow(FIRST_LIGHT + number, shadow, path.pixel);
+    push_shadow(catcher_source(1u + number), shadow, pixel);
   }
 }
 
@@ -171,6 +175,20 @@ fn roulette(next: Next, bounces: u32, seed: Wide) -> Next {
   return Next(next.is_ray && goes_on, next.direction, next.throughput / chance, next.pdf);
 }
 
+// The place in the film of the indirect light that is being traced for a pixel
+fn indirect_place(pixel: u32) -> u32 { return (1u + view.has_odd) * view.width * view.height + pixel; }
+
+// Adds the light along a ray. A clamp limits what it brings to its first surface, but `direct`; that stays apart until
+// its shadow rays are traced.
+fn add_light(pixel: u32, light: vec4<f32>, direct: vec4<f32>) {
+  if (!HAS_CLAMP || stage.depth == 1u) {
+    add_to_film(pixel, light);
+    return;
+  }
+  add_to_film(pixel, direct);
+  film[indirect_place(pixel)] = light - direct;
+}
+
 // Adds what a ray sees without shadows, and appends the rays that leave its intersection.
 fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   var sum = vec4<f32>(0.0);
@@ -184,7 +202,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   let is_sphere = is_open && hit.slot != MISS;
   let is_ground = is_open && hit.slot == MISS && ground.t < FAR;
   var seed = Wide(0u);
-  if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces); }
+  if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces, BOUNCED); }
   // A catcher shows its shadows only
   let is_caught = is_first && is_ground && scene.is_catcher == 1u;
   // What is behind all surfaces, and behind a ground that fades out
@@ -197,9 +215,19 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
       sum += vec4<f32>(uncovered * path.throughput * environment_along(ray.direction, pdf), 0.0);
     }
   }
+  // A glossy reflection sees the environment through a catcher
+  var weight = path.throughput;
+  var behind = vec3<f32>(0.0);
+  let is_passed = HAS_MIRRORS && is_ground && !is_first && any(path.diffuse != vec3<f32>(1.0));
+  if (is_passed) {
+    behind = ground.opacity * weight * (1.0 - path.diffuse) * environment_along(ray.direction, FAR);
+    sum += vec4<f32>(behind, 0.0);
+    weight *= path.diffuse;
+  }
+  // The first surface reflects this light, which has no limit
+  let direct = select(vec4<f32>(0.0), sum, stage.depth == 2u);
   // The point of the surface
   var vertex: Vertex;
-  var weight = path.throughput;
   if (is_sphere) {
     let surface = surface_at(ray, hit);
     vertex = Vertex(surface.normal, surface.start, base_color(hit.index), -ray.direction, finish_of(hit.index));
@@ -215,8 +243,13 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   if (is_first && (is_sphere || (is_ground && !is_caught))) {
     sum.w += select(1.0, ground.opacity, view.transparent == 1u && is_ground);
   }
-  if (is_first && scene.is_catcher == 1u) { catch_shadows(is_caught, ground, ray, path, seed); }
-  var is_shaded = (is_sphere || is_ground) && !is_caught && bounces <= scene.bounces;
+  if (scene.is_catcher == 1u && (is_first || HAS_MIRRORS)) {
+    if (is_first) { behind = seen_behind(ray, path.on_film); }
+    let darkness = scene.catcher_strength * select(1.0, ground.opacity, is_first);
+    catch_shadows(is_caught || is_passed, ground, ray, behind, darkness, path.pixel, seed);
+  }
+  let is_mirror = is_passed && largest_of(path.diffuse) == 0.0;
+  var is_shaded = (is_sphere || is_ground) && !is_caught && !is_mirror && bounces <= scene.bounces;
   if (is_shaded && scene.is_ambient == 1u && bounces > 0u) {
     sum += vec4<f32>(ambient_light(vertex, weight, t, seed), 0.0);
     is_shaded = false;
@@ -265,8 +298,16 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     next_rays[RAY * place] = vec4<f32>(vertex.start, bitcast<f32>(path.pixel));
     next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
+    if (HAS_MIRRORS) {
+      let diffuse = diffuse_fraction(vertex.finish, vertex.base, vertex.normal, vertex.out, next.direction);
+      next_rays[RAY * place + 3u] = vec4<f32>(diffuse, 0.0);
+    }
   }
-  if (is_ray) { add_to_film(path.pixel, sum); }
+  if (is_ray) {
+    add_light(path.pixel, sum, direct);
+    let of_ground = object_of_ground(select(1.0, ground.opacity, view.transparent == 1u));
+    keep_object(path.pixel, select(select(MISS, of_ground, is_ground && !is_caught), hit.index, is_sphere));
+  }
 }
 
 // Camera rays, in squares of 8x8 pixels.
@@ -274,7 +315,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
 fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
   let is_ray = id.x < view.width && id.y < view.height;
   let pixel = id.y * view.width + id.x;
-  var path = Path(vec3<f32>(1.0), FAR, pixel, vec2<f32>(0.0));
+  var path = Path(vec3<f32>(1.0), FAR, pixel, vec2<f32>(0.0), vec3<f32>(1.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
@@ -283,11 +324,11 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
     path.on_film = film_position(id.x, id.y, current.sample);
     ray = camera_ray(path.on_film);
     if (view.lens_radius > 0.0) {
-      let seed = child_of(seed_at(pixel, 0u), CAMERA);
+      let seed = child_of(seed_at(pixel, 0u, BOUNCED), CAMERA);
       ray = through_lens(ray, numbers_2d(seed, LENS, current.sample));
     }
     ground = hit_ground(ray);
-    hit = nearest(ray, ground.t);
+    hit = nearest(ray, ground.t, number_of_end(pixel, BOUNCED));
   }
   follow(is_ray, ray, path, ground, hit);
 }
@@ -301,7 +342,7 @@ fn trace_next(
 ) {
   let i = linear_index(group, groups, local, GROUP);
   let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
-  var path = Path(vec3<f32>(0.0), FAR, 0u, vec2<f32>(0.0));
+  var path = Path(vec3<f32>(0.0), FAR, 0u, vec2<f32>(0.0), vec3<f32>(1.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
@@ -309,9 +350,10 @@ fn trace_next(
     let origin = rays[RAY * i];
     let direction = rays[RAY * i + 1u];
     ray = Ray(origin.xyz, direction.xyz);
-    path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0));
+    path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0), vec3<f32>(1.0));
+    if (HAS_MIRRORS) { path.diffuse = rays[RAY * i + 3u].xyz; }
     ground = hit_ground(ray);
-    hit = nearest(ray, ground.t);
+    hit = nearest(ray, ground.t, number_of_end(path.pixel, BOUNCED));
   }
   follow(is_ray, ray, path, ground, hit);
 }
@@ -330,9 +372,47 @@ fn trace_shadow(
   let into = shadows[place + 1u];
   let light = shadows[place + 2u];
   let ray = Ray(start.xyz, into.xyz);
-  let is_blocked = is_below_ground(ray, into.w) || is_occluded(ray, into.w);
+  var passing = 0.0;
+  if (!is_below_ground(ray, into.w)) { passing = transmittance(ray, into.w); }
   let adds = light.w == ADDS;
-  if (is_blocked == adds) { return; }
-  let coverage = select(0.0, light.w, !adds && view.transparent == 1u);
-  add_to_film(bitcast<u32>(start.w), vec4<f32>(light.xyz, coverage));
+  let part = select(1.0 - passing, passing, adds);
+  if (part == 0.0) { return; }
+  let coverage = part * select(0.0, light.w, !adds && view.transparent == 1u);
+  let pixel = bitcast<u32>(start.w);
+  // What the first surface reflects of a catcher has no limit
+  if (HAS_CLAMP && stage.depth > select(2u, 1u, adds)) {
+    film[indirect_place(pixel)] += vec4<f32>(part * light.xyz, 0.0);
+  } else {
+    add_to_film(pixel, vec4<f32>(part * light.xyz, coverage));
+  }
+}
+
+// Counts light that a clamp takes away.
+fn count_lost(radiance: vec3<f32>) {
+  let steps = clamp((radiance.x + radiance.y + radiance.z) * LOST_STEPS, 0.0, MAX_LOST);
+  let upper = u32(steps / 4294967296.0);
+  let lower = u32(steps - f32(upper) * 4294967296.0);
+  let before = atomicAdd(&queued[stage.counters - 2u], lower);
+  atomicAdd(&queued[stage.counters - 1u], upper + select(0u, 1u, before + lower < lower));
+}
+
+// Adds the indirect light of the rays of a depth, up to the limit.
+@compute @workgroup_size(GROUP)
+fn clamp_indirect(
+  @builtin(workgroup_id) group: vec3<u32>,
+  @builtin(num_workgroups) groups: vec3<u32>,
+  @builtin(local_invocation_index) local: u32,
+) {
+  let i = linear_index(group, groups, local, GROUP);
+  if (i >= atomicLoad(&queued[queue_of(stage.depth - 1u)])) { return; }
+  let pixel = bitcast<u32>(rays[RAY * i].w);
+  let light = film[indirect_place(pixel)];
+  let largest = largest_of(light.xyz);
+  // What is not finite stays, so that faults are visible
+  var part = 1.0;
+  if (largest > scene.indirect_limit && largest < FAR) {
+    part = scene.indirect_limit / largest;
+    count_lost(light.xyz * (1.0 - part));
+  }
+  add_to_film(pixel, light * part);
 }

@@ -6,11 +6,13 @@
 // The order of a queue changes from run to run, but not the picture: in a dispatch, each pixel receives at most one
 // contribution.
 
-// Sums over the samples of each pixel: red, green, blue, coverage; then, for denoising, those over every second sample
+// Sums over the samples of each pixel: red, green, blue, coverage; then, for denoising, those over every second sample;
+// then, with a clamp, the indirect light of the ray that is being traced
 @group(0) @binding(6) var<storage, read_write> film: array<vec4<f32>>;
 // The nearest sample of each pixel: depth, index of the sphere, normal, position
 @group(0) @binding(7) var<storage, read_write> data: array<vec4<u32>>;
-// Lengths of the queues of a sample: for each depth, that of the rays that go on, then those of shadow rays by source
+// Lengths of the queues of a sample: for each depth, that of the rays that go on, then those of shadow rays by source. At
+// the end, the lower and the upper word of the light that a clamp takes away
 @group(0) @binding(8) var<storage, read_write> queued: array<atomic<u32>>;
 // Rays of this depth and of the next one, `RAY` vectors each: origin and pixel, and what the model needs
 @group(0) @binding(9) var<storage, read> rays: array<vec4<f32>>;
@@ -18,16 +20,18 @@
 // Queues of shadow rays, one behind the other, `SHADOW` vectors each: start and pixel, and what the model needs
 @group(0) @binding(11) var<storage, read_write> shadows: array<vec4<f32>>;
 @group(0) @binding(13) var<uniform> stage: Stage;
-// The lengths of all queues over all samples, in two words each
+// The same over all samples, in two words each
 @group(0) @binding(14) var<storage, read_write> sums: array<u32>;
 
 @group(0) @binding(18) var<uniform> current: Current;
+// The first surface of each sample, pixel by pixel
+@group(0) @binding(20) var<storage, read_write> objects: array<u32>;
 
 // Invocations of a workgroup that follows a queue
 const GROUP: u32 = 64u;
 
 // What differs between the dispatches of a sample. `depth` counts from 1.
-struct Stage { depth: u32, source: u32, queues: u32, zero: u32 }
+struct Stage { depth: u32, source: u32, counters: u32, zero: u32 }
 
 // What differs between samples
 struct Current { sample: u32, zero: u32, zero_too: u32, zero_three: u32 }
@@ -51,6 +55,14 @@ fn add_to_film(pixel: u32, sum: vec4<f32>) {
   if (view.has_odd == 1u && (current.sample & 1u) == 1u) { film[view.width * view.height + pixel] += sum; }
 }
 
+// Keeps the first surface of a sample (HAS_OBJECTS): the index of a sphere, `object_of_ground`, or MISS.
+fn keep_object(pixel: u32, object: u32) {
+  if (HAS_OBJECTS && stage.depth == 1u) { objects[pixel * view.samples + current.sample] = object; }
+}
+
+// The ground with its coverage, as a negative number
+fn object_of_ground(coverage: f32) -> u32 { return bitcast<u32>(-coverage); }
+
 // Empties a pixel before its first sample.
 fn clear_pixel(pixel: u32) {
   film[pixel] = vec4<f32>(0.0);
@@ -70,10 +82,10 @@ fn keep_nearest(depth: f32, index: u32, normal: vec3<f32>, point: vec3<f32>, pix
 // Empties all queues before a sample, and adds up their lengths.
 @compute @workgroup_size(GROUP)
 fn empty_queues(@builtin(global_invocation_id) id: vec3<u32>) {
-  let queue = id.x;
-  if (queue >= stage.queues) { return; }
-  let length = atomicExchange(&queued[queue], 0u);
-  let sum = sums[2u * queue] + length;
-  sums[2u * queue + 1u] += select(0u, 1u, sum < length);
-  sums[2u * queue] = sum;
+  let counter = id.x;
+  if (counter >= stage.counters) { return; }
+  let count = atomicExchange(&queued[counter], 0u);
+  let sum = sums[2u * counter] + count;
+  sums[2u * counter + 1u] += select(0u, 1u, sum < count);
+  sums[2u * counter] = sum;
 }

@@ -1,4 +1,4 @@
-// The random numbers of paths: Owen-scrambled Sobol' points from a seed for each vertex of a path. They are those of the
+// The random numbers of rays: Owen-scrambled Sobol' points from a seed for each vertex of a path. They are those of the
 // CPU to the bit, so that both draw the same picture, not one with other noise.
 
 // Numbers of 64 bits as (low, high)
@@ -35,7 +35,8 @@ fn mix_wide(state: Wide) -> Wide {
   return fold_wide(z, 31u);
 }
 
-// Continuations of a path, and dimensions at one of its vertices
+// Continuations of a path, and dimensions at one of its vertices or of a segment
+const REFLECTED: u32 = 0u;
 const BOUNCED: u32 = 2u;
 const CAMERA: u32 = 3u;
 const CONTINUATION: u32 = 1u;
@@ -43,6 +44,7 @@ const BSDF: u32 = 2u;
 const ENVIRONMENT: u32 = 3u;
 const LIGHTS: u32 = 4u;
 const LENS: u32 = 0u;
+const OPACITY: u32 = 0xfffffffcu;
 
 fn seed_of_pixel(x: u32, y: u32) -> Wide { return mix_wide(Wide(x, y)); }
 
@@ -87,4 +89,20 @@ fn numbers_2d(seed: Wide, dimension: u32, sample: u32) -> vec2<f32> {
     unit_number(scramble(reverseBits(shuffled), halves.x)),
     unit_number(scramble(second_coordinate(shuffled), halves.y)),
   );
+}
+
+// The seed of the random numbers of a pixel after a number of reflections: to find it again costs less than to keep it
+// in queues
+fn seed_at(pixel: u32, bounces: u32, branch: u32) -> Wide {
+  let x = i32(pixel % view.width) + view.corner.x;
+  let y = i32(pixel / view.width) + view.corner.y;
+  var seed = seed_of_pixel(u32(x), u32(y)) ^ view.sequence;
+  for (var i = 0u; i < bounces; i++) { seed = child_of(seed, branch); }
+  return seed;
+}
+
+// The number that chooses at which sphere a ray of this depth ends, if they are not opaque
+fn number_of_end(pixel: u32, branch: u32) -> f32 {
+  if (!HAS_OPACITY) { return 0.0; }
+  return number_1d(seed_at(pixel, stage.depth - 1u, branch), OPACITY, current.sample);
 }

@@ -15,9 +15,11 @@ struct SceneUniform {
   // Tables of the environment, and of it times the cosine with the ground; without one, the edge is 0
   environment: Table,
   catcher: Table,
-  // First pixel of the image of the environment
-  image: u32, is_environment_visible: u32, zero: u32, zero_too: u32,
-  finish_count: u32, is_ambient: u32, zero_again: u32, zero_at_last: u32,
+  // First pixel of the image of the environment; the largest component of the indirect light along a ray
+  image: u32, is_environment_visible: u32, indirect_limit: f32, finish_count: u32,
+  // The image at its own resolution: its size, and a factor on its radiance
+  detail_scale: vec3<f32>, is_ambient: u32,
+  detail_size: vec2<u32>, zeros: vec2<u32>,
   // How spheres reflect light, by the first index of each group
   finishes: array<Finish, 65>,
   // Irradiance of the environment

@@ -1,7 +1,9 @@
 // Points of spheres, their colours, and what is behind them.
 
-// Base colours of the spheres
+// Base colours of the spheres, `COLOR` numbers each: the fourth is the opacity
 @group(0) @binding(12) var<storage, read> colors: array<f32>;
+
+const COLOR: u32 = select(3u, 4u, HAS_OPACITY);
 
 const OFFSET_OF_RADIUS: f32 = 1e-4;
 // Eight units in the last place of 1
@@ -30,8 +32,11 @@ fn backdrop(direction: vec3<f32>, at: vec2<f32>) -> vec3<f32> {
 
 fn base_color(index: u32) -> vec3<f32> {
   if (view.color_kind == 0u) { return view.color; }
-  return vec3<f32>(colors[3u * index], colors[3u * index + 1u], colors[3u * index + 2u]);
+  let at = COLOR * index;
+  return vec3<f32>(colors[at], colors[at + 1u], colors[at + 2u]);
 }
+
+fn opacity_of(index: u32) -> f32 { return colors[COLOR * index + 3u]; }
 
 struct Surface { point: vec3<f32>, normal: vec3<f32>, start: vec3<f32>, is_entering: bool }
 

@@ -1,6 +1,10 @@
 // Finds the spheres that rays intersect. Distances, and which sphere wins, equal those of the CPU to the bit.
 //
-// Files that include this one define `view: View` with the fields used here.
+// If spheres are not opaque (HAS_OPACITY), a ray that enters one ends there with the probability of its opacity, or else
+// passes it in a straight line; shadow rays are attenuated by all that they enter. Spheres in which a ray starts do not
+// count then.
+//
+// Files that include this one define `view: View` with the fields used here, and `fn opacity_of(index: u32) -> f32`.
 
 @group(0) @binding(1) var<storage, read> nodes: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> spheres: array<vec4<f32>>;
@@ -8,6 +12,8 @@
 
 const MISS: u32 = 0xffffffffu;
 const FAR: f32 = 3.4e38;
+// Transmittance below which a shadow ray ends
+const DARK: f32 = 1.0 / 4096.0;
 // Rounding of the box test, relative to the distances in it
 const SLAB_SLACK: f32 = 1e-6;
 
@@ -50,6 +56,7 @@ fn distance_to(sphere: vec4<f32>, ray: Ray) -> f32 {
   if (!(discriminant >= 0.0)) { return -1.0; }
   let half = root(discriminant);
   let near = middle - half;
+  if (HAS_OPACITY) { return near; }
   return select(middle + half, near, near >= 0.0);
 }
 
@@ -58,11 +65,11 @@ fn bytes_of(word: u32) -> vec4<f32> {
   return vec4<f32>(f32(word & 255u), f32((word >> 8u) & 255u), f32((word >> 16u) & 255u), f32(word >> 24u));
 }
 
-// For each child that the ray enters before `limit`: the distance, with the number of the child in the lowest three
-// bits; MISS for the others. The keys of distances that are not negative have the order of the distances.
+// For each child in which the ray is somewhere from `start` to `limit`: the distance, with the number of the child in the
+// lowest three bits; MISS for the others. The keys of distances that are not negative have the order of the distances.
 struct Keys { low: vec4<u32>, high: vec4<u32> }
 
-fn test_children(at: u32, p: Prepared, limit: f32) -> Keys {
+fn test_children(at: u32, p: Prepared, start: f32, limit: f32) -> Keys {
   let head = nodes[at];
   let px = nodes[at + 1u];
   let py = nodes[at + 2u];
@@ -85,14 +92,14 @@ fn test_children(at: u32, p: Prepared, limit: f32) -> Keys {
   let sx = vec4<f32>(steps.x);
   let sy = vec4<f32>(steps.y);
   let sz = vec4<f32>(steps.z);
-  let zeros = vec4<f32>(0.0);
+  let starts = vec4<f32>(start);
   let limits = vec4<f32>(limit);
   let enter0 = max(
     max(fma(bytes_of(x.x), sx, vec4<f32>(low.x)), fma(bytes_of(y.x), sy, vec4<f32>(low.y))),
-    max(fma(bytes_of(z.x), sz, vec4<f32>(low.z)), zeros));
+    max(fma(bytes_of(z.x), sz, vec4<f32>(low.z)), starts));
   let enter1 = max(
     max(fma(bytes_of(x.y), sx, vec4<f32>(low.x)), fma(bytes_of(y.y), sy, vec4<f32>(low.y))),
-    max(fma(bytes_of(z.y), sz, vec4<f32>(low.z)), zeros));
+    max(fma(bytes_of(z.y), sz, vec4<f32>(low.z)), starts));
   let leave0 = min(
     min(fma(bytes_of(x.z), sx, vec4<f32>(high.x)), fma(bytes_of(y.z), sy, vec4<f32>(high.y))),
     min(fma(bytes_of(z.z), sz, vec4<f32>(high.z)), limits));
@@ -120,8 +127,8 @@ fn first_node(level: u32) -> u32 {
   return view.starts[(level - 1u) >> 2u][(level - 1u) & 3u];
 }
 
-// The nearest sphere before `limit`. At equal distances, the lower index wins.
-fn nearest(ray: Ray, limit: f32) -> Hit {
+// The nearest sphere before `limit`, behind `last` if spheres are not opaque. At equal distances, the lower index wins.
+fn nearest_behind(last: Hit, ray: Ray, limit: f32) -> Hit {
   let p = prepare(ray);
   var hit = Hit(limit, MISS, MISS);
   // Place and key of nodes that are left
@@ -137,11 +144,13 @@ fn nearest(ray: Ray, limit: f32) -> Hit {
         let t = distance_to(spheres[slot], ray);
         if (t >= 0.0 && t <= hit.t) {
           let found = index_of(slot);
+          let is_passed = t < last.t || (t == last.t && found <= last.index);
+          if (HAS_OPACITY && is_passed) { continue; }
           if (t < hit.t || found < hit.index) { hit = Hit(t, slot, found); }
         }
       }
     } else {
-      let keys = test_children(4u * (first_node(level) + index), p, hit.t);
+      let keys = test_children(4u * (first_node(level) + index), p, select(0.0, last.t, HAS_OPACITY), hit.t);
       let child = ((level - 1u) << 28u) | (index << 3u);
       // Sort the children by distance (the network of Batcher, 1968)
       var k0 = keys.low.x; var k1 = keys.low.y; var k2 = keys.low.z; var k3 = keys.low.w;
@@ -180,9 +189,25 @@ fn nearest(ray: Ray, limit: f32) -> Hit {
   return hit;
 }
 
-// Whether there is a sphere before `limit`.
-fn is_occluded(ray: Ray, limit: f32) -> bool {
+// The sphere at which a ray ends before `limit`; the number `u` chooses it if spheres are not opaque.
+fn nearest(ray: Ray, limit: f32, u: f32) -> Hit {
+  var hit = nearest_behind(Hit(0.0, MISS, 0u), ray, limit);
+  if (!HAS_OPACITY) { return hit; }
+  var rest = u;
+  while (hit.slot != MISS) {
+    let opacity = opacity_of(hit.index);
+    if (rest < opacity) { break; }
+    // What is left of the number is random, too
+    rest = quotient(rest - opacity, 1.0 - opacity);
+    hit = nearest_behind(hit, ray, limit);
+  }
+  return hit;
+}
+
+// The part of the light that the spheres before `limit` let through.
+fn transmittance(ray: Ray, limit: f32) -> f32 {
   let p = prepare(ray);
+  var product = 1.0;
   // First child and the mask of the children that are left
   var stack: array<vec2<u32>, STACK>;
   var size = 0u;
@@ -192,11 +217,15 @@ fn is_occluded(ray: Ray, limit: f32) -> bool {
     let index = at & 0x0fffffffu;
     if (level == 0u) {
       for (var j = 0u; j < BLOCK; j++) {
-        let t = distance_to(spheres[index * BLOCK + j], ray);
-        if (t >= 0.0 && t < limit) { return true; }
+        let slot = index * BLOCK + j;
+        let t = distance_to(spheres[slot], ray);
+        if (!(t >= 0.0 && t < limit)) { continue; }
+        if (!HAS_OPACITY) { return 0.0; }
+        product *= 1.0 - opacity_of(index_of(slot));
+        if (product < DARK) { return 0.0; }
       }
     } else {
-      let keys = test_children(4u * (first_node(level) + index), p, limit);
+      let keys = test_children(4u * (first_node(level) + index), p, 0.0, limit);
       let child = ((level - 1u) << 28u) | (index << 3u);
       let misses = vec4<u32>(MISS);
       let low = select(vec4<u32>(1u, 2u, 4u, 8u), vec4<u32>(0u), keys.low == misses);
@@ -220,5 +249,5 @@ fn is_occluded(ray: Ray, limit: f32) -> bool {
     let rest = next.y & (next.y - 1u);
     if (rest == 0u) { size--; } else { stack[size - 1u].y = rest; }
   }
-  return false;
+  return product;
 }

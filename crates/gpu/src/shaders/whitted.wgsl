@@ -1,4 +1,4 @@
-// Whitted ray tracing of opaque spheres: equation 4.1 of the thesis, as the CPU's integrator.
+// Whitted ray tracing of spheres: equation 4.1 of the thesis, as the CPU's integrator.
 //
 // Rays are computed with the operations of the CPU, so that they meet the same spheres; colours are not, so that they
 // may differ in the last bits. The sources of shadow rays are the lights. A ray that goes on has its direction and
@@ -107,7 +107,10 @@ fn follow(is_ray: bool, ray: Ray, throughput: f32, pixel: u32, hit: Hit, on_film
       shadows[SHADOW * place + 1u] = vec4<f32>(radiance, 0.0);
     }
   }
-  if (is_ray) { add_to_film(pixel, sum); }
+  if (is_ray) {
+    add_to_film(pixel, sum);
+    keep_object(pixel, select(MISS, hit.index, is_hit));
+  }
 }
 
 // Camera rays, in squares of 8x8 pixels.
@@ -122,7 +125,7 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
     if (current.sample == 0u) { clear_pixel(pixel); }
     on_film = film_position(id.x, id.y, current.sample);
     ray = camera_ray(on_film);
-    hit = nearest(ray, FAR);
+    hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
   }
   follow(is_ray, ray, 1.0, pixel, hit, on_film);
 }
@@ -146,7 +149,7 @@ fn trace_next(
     ray = Ray(origin.xyz, direction.xyz);
     throughput = direction.w;
     pixel = bitcast<u32>(origin.w);
-    hit = nearest(ray, FAR);
+    hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
   }
   follow(is_ray, ray, throughput, pixel, hit, vec2<f32>(0.0));
 }
@@ -163,7 +166,8 @@ fn trace_shadow(
   let place = i + first_shadow(stage.source);
   let start = shadows[SHADOW * place];
   let into = toward(view.lights[stage.source], start.xyz);
-  if (!is_occluded(Ray(start.xyz, into.xyz), into.w)) {
-    add_to_film(bitcast<u32>(start.w), vec4<f32>(shadows[SHADOW * place + 1u].xyz, 0.0));
+  let passing = transmittance(Ray(start.xyz, into.xyz), into.w);
+  if (passing > 0.0) {
+    add_to_film(bitcast<u32>(start.w), vec4<f32>(passing * shadows[SHADOW * place + 1u].xyz, 0.0));
   }
 }

@@ -208,7 +208,12 @@ impl RenderContext<'_> {
 
     /// The object of `kind` at an intersection with a surface of `material`, which belongs to `particle` if that has
     /// particles.
-    fn object(&self, kind: MatteKind, material: MaterialId, particle: impl Fn() -> u32) -> u32 {
+    pub(super) fn object(
+        &self,
+        kind: MatteKind,
+        material: MaterialId,
+        particle: impl Fn() -> u32,
+    ) -> u32 {
         let owner = self.scene.material(material).owner;
         // Particles are told apart by id, part or material; all other surfaces of a material are one object
         let name = match (owner.is_of_particles(), kind) {

@@ -16,12 +16,15 @@ use super::{
     aov::{DataSample, NO_ID},
     channels::Channels,
     context::RenderContext,
+    cryptomatte::rank,
     film::{Film, FilmTile, bounded},
+    layers::MatteKind,
     planes::FilmPlane,
     settings::{RenderError, RenderSettings},
     source::ShadeSource,
 };
 use crate::scene::Scene;
+use spherule_surface::MaterialId;
 
 /// Rows that a thread fills at a time.
 const ROWS: u32 = 16;
@@ -50,13 +53,32 @@ pub struct DeviceHit {
     pub point: Vec3,
 }
 
-/// Whether all planes of `channels` come from the nearest sample of each pixel, so that [`store_pixels`] fills them.
-pub fn are_from_nearest(channels: &Channels) -> bool {
-    FilmPlane::all().filter(|plane| channels.has(*plane)).all(|plane| plane.is_from_nearest())
+/// The object that the first surface of a sample belongs to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceObject {
+    /// Index of the particle; None on the ground.
+    pub particle: Option<u32>,
+    /// How much of the sample it covers, 0 to 1.
+    pub coverage: f32,
 }
 
-/// Makes `film` a picture of `scene` with these settings, whose pixels `pixel` returns row by row from the top, by their
-/// number.
+/// What a device found in the pixels of a picture, by their number, row by row from the top.
+pub trait DevicePixels: Sync {
+    /// The means and the nearest intersection.
+    fn pixel(&self, number: usize) -> DevicePixel;
+
+    /// The objects of the samples, without those that show neither a particle nor the ground. For Cryptomatte.
+    fn objects(&self, number: usize) -> impl Iterator<Item = DeviceObject>;
+}
+
+/// Whether [`store_pixels`] fills all planes of `channels`: those of the nearest sample of each pixel, and of Cryptomatte.
+pub fn stores_all(channels: &Channels) -> bool {
+    let is_matte = |plane: FilmPlane| MatteKind::ALL.iter().any(|kind| kind.plane() == plane);
+    let mut planes = FilmPlane::all().filter(|plane| channels.has(*plane));
+    planes.all(|plane| plane.is_from_nearest() || is_matte(plane))
+}
+
+/// Makes `film` a picture of `scene` with these settings and `pixels`.
 ///
 /// # Errors
 /// If a setting is out of range.
@@ -65,19 +87,24 @@ pub fn store_pixels(
     scene: &Scene,
     source: &dyn ShadeSource,
     settings: &RenderSettings,
-    pixel: &(dyn Fn(usize) -> DevicePixel + Sync),
+    pixels: &impl DevicePixels,
 ) -> Result<(), RenderError> {
     settings.validate()?;
     let RenderSettings { width, height, channels, has_features, .. } = *settings;
     film.fit(width, height, channels, has_features);
     let context = RenderContext::new(Vec::new(), scene, source, settings);
     film.bands_mut(ROWS).into_par_iter().for_each(|mut band| {
+        let mut objects = PixelObjects::default();
         for mut tile in band.tiles(width) {
             for row in 0..tile.rows {
                 let first = (tile.top + row) as usize * width as usize;
                 for column in 0..tile.width {
-                    let found = pixel(first + column as usize);
-                    context.store_pixel(&mut tile, [column, row], &found);
+                    let number = first + column as usize;
+                    context.store_pixel(&mut tile, [column, row], &pixels.pixel(number));
+                    if context.settings.channels.mattes().next().is_some() {
+                        objects.add_up(pixels.objects(number));
+                        context.store_objects(&mut tile, [column, row], &mut objects);
+                    }
                 }
             }
         }
@@ -85,7 +112,50 @@ pub fn store_pixels(
     Ok(())
 }
 
+/// The objects of a pixel.
+#[derive(Default)]
+struct PixelObjects {
+    /// Each one once, with the coverage of all its samples.
+    all: Vec<DeviceObject>,
+    /// Objects of one kind with their coverage.
+    covered: Vec<(u32, f32)>,
+}
+
+impl PixelObjects {
+    fn add_up(&mut self, samples: impl Iterator<Item = DeviceObject>) {
+        self.all.clear();
+        for sample in samples {
+            match self.all.iter_mut().find(|sum| sum.particle == sample.particle) {
+                Some(sum) => sum.coverage += sample.coverage,
+                None => self.all.push(sample),
+            }
+        }
+    }
+}
+
 impl RenderContext<'_> {
+    /// Ranks the objects of each kind by the part of a pixel that they cover.
+    fn store_objects(
+        &self,
+        tile: &mut FilmTile<'_>,
+        [column, row]: [u32; 2],
+        PixelObjects { all, covered }: &mut PixelObjects,
+    ) {
+        let share = 1.0 / self.settings.samples as f32;
+        for kind in self.settings.channels.mattes() {
+            let object = |of: &DeviceObject| match of.particle {
+                Some(particle) => {
+                    let material = self.source.style(particle).unwrap_or(MaterialId::PARTICLES);
+                    self.object(kind, material, || particle)
+                }
+                None => self.object(kind, MaterialId::GROUND, || 0),
+            };
+            covered.clear();
+            covered.extend(all.iter().map(|of| (object(of), of.coverage)));
+            rank(covered, share, tile.components_mut(kind.plane(), column, row));
+        }
+    }
+
     fn store_pixel(&self, tile: &mut FilmTile<'_>, [column, row]: [u32; 2], pixel: &DevicePixel) {
         // A shadow catcher takes light away, sample by sample
         let is_bounded = self.catches_shadows();

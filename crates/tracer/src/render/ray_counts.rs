@@ -9,8 +9,13 @@ pub struct LostLight(u64);
 impl LostLight {
     /// Nothing.
     pub const NONE: Self = Self(0);
-    /// Steps of a unit of radiance: finer than the noise of any picture.
+    /// Steps of a unit of radiance, the sum of its components: finer than the noise of any picture.
     const STEPS: f32 = 4096.0;
+
+    /// Light that another device has lost, in steps of 1/4096, each rounded down.
+    pub const fn from_steps(steps: u64) -> Self {
+        Self(steps)
+    }
 
     /// Adds light that a sample has lost, linear RGB.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 use spherule_tree::math::functions::{acos, atan2};
 
 use super::COLUMNS;
@@ -26,6 +27,16 @@ impl DetailMap {
         let largest = Vec3::splat(f16::MAX.to_f32());
         let half = |rgb: &Vec3| rgb.min(largest).to_array().map(f16::from_f32);
         Self { width, height, pixels: map.pixels().iter().map(half).collect() }
+    }
+
+    /// Width and height in pixels.
+    pub const fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// The bits of the half floats, three a pixel, row by row from the zenith. The middle column is in front.
+    pub fn bits(&self) -> &[u16] {
+        self.pixels.as_flattened().reinterpret_cast()
     }
 
     /// Memory, bytes.

@@ -165,9 +165,9 @@ impl Environment {
         Self { axes, table: self.table.with_axes(axes), ..self }
     }
 
-    /// Whether it has an image at its own resolution.
-    pub const fn has_detail(&self) -> bool {
-        self.detail.is_some()
+    /// The image at its own resolution, with a factor on its radiance, if it has one.
+    pub const fn detail(&self) -> Option<&(Arc<DetailMap>, Vec3)> {
+        self.detail.as_ref()
     }
 
     /// An environment without small lights.

@@ -1,0 +1,135 @@
+//! The kernels that trace pictures, compiled for what a picture needs: other pictures have none of its code.
+
+use crate::Device;
+use crate::commands::Kernel;
+use crate::picture::Picture;
+use crate::tree::{GROUPS, TreeShape, tree_constants};
+
+/// Entries of the traversal's stack for each level of nodes: all children but the one that is visited next.
+const STACK_PER_LEVEL: u32 = 7;
+/// Levels that the shortest stack holds. Fewer levels do not make it faster.
+const MIN_STACK_LEVELS: u32 = 6;
+
+/// Kernels for trees of one kind.
+#[derive(Debug)]
+pub(crate) struct Kernels {
+    pub(crate) empty_queues: Kernel,
+    pub(crate) trace_camera: Kernel,
+    pub(crate) trace_next: Kernel,
+    pub(crate) trace_shadow: Kernel,
+    /// If indirect light has a limit.
+    pub(crate) clamp_indirect: Option<Kernel>,
+}
+
+/// What the source of the kernels depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Variant {
+    /// Whether paths are traced.
+    has_paths: bool,
+    /// Whether spheres have an opacity each.
+    has_opacity: bool,
+    /// Whether indirect light has a limit.
+    has_clamp: bool,
+    /// Whether the environment has an image at its own resolution.
+    has_detail: bool,
+    /// Whether mirrors see the environment through a shadow catcher.
+    has_mirrors: bool,
+    /// Whether the first surfaces of samples are kept.
+    has_objects: bool,
+    /// Whether radii are equal.
+    is_common: bool,
+    /// Levels that the stack holds.
+    levels: u32,
+}
+
+/// The sources of path tracing.
+const PATHS: [&str; 5] = [
+    include_str!("shaders/scene.wgsl"),
+    include_str!("shaders/environment.wgsl"),
+    include_str!("shaders/ground.wgsl"),
+    include_str!("shaders/bsdf.wgsl"),
+    include_str!("shaders/path.wgsl"),
+];
+const WHITTED: [&str; 1] = [include_str!("shaders/whitted.wgsl")];
+
+impl Variant {
+    /// What a picture of a tree needs.
+    pub(crate) fn of(picture: &Picture<'_>, shape: &TreeShape, has_opacity: bool) -> Self {
+        Self {
+            has_paths: picture.has_paths(),
+            has_opacity,
+            has_clamp: picture.has_clamp(),
+            has_detail: picture.detail().is_some(),
+            has_mirrors: picture.ray_kinds().has_mirrors,
+            has_objects: picture.has_objects,
+            is_common: shape.is_common,
+            levels: shape.levels.max(MIN_STACK_LEVELS),
+        }
+    }
+
+    /// The constants of the shaders.
+    fn constants(self) -> String {
+        let flags = [
+            ("HAS_OPACITY", self.has_opacity),
+            ("HAS_CLAMP", self.has_clamp),
+            ("HAS_DETAIL", self.has_detail),
+            ("HAS_MIRRORS", self.has_mirrors),
+            ("HAS_OBJECTS", self.has_objects),
+        ];
+        let flags = flags.map(|(name, value)| format!("const {name}: bool = {value};\n"));
+        let stack = format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * self.levels);
+        [stack, flags.concat()].concat()
+    }
+}
+
+impl Kernels {
+    /// Compiles the kernels.
+    pub(crate) fn new(device: &Device, variant: Variant) -> Self {
+        let append = if device.has_subgroups() {
+            include_str!("shaders/append_subgroup.wgsl")
+        } else {
+            include_str!("shaders/append_atomic.wgsl")
+        };
+        let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
+        let source = [
+            device.arithmetic().source(),
+            &tree_constants(variant.is_common),
+            &variant.constants(),
+            GROUPS,
+            include_str!("shaders/view.wgsl"),
+            include_str!("shaders/arithmetic.wgsl"),
+            include_str!("shaders/functions.wgsl"),
+            include_str!("shaders/traverse.wgsl"),
+            include_str!("shaders/camera.wgsl"),
+            include_str!("shaders/surface.wgsl"),
+            include_str!("shaders/lights.wgsl"),
+            include_str!("shaders/queues.wgsl"),
+            include_str!("shaders/sampler.wgsl"),
+            append,
+            &model.concat(),
+        ];
+        let module = device.module(&source.concat());
+        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
+        let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
+            [
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
+                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18],
+            ]
+        } else {
+            [
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
+                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 18],
+            ]
+        };
+        Self {
+            empty_queues: kernel("empty_queues", &[8, 13, 14]),
+            trace_camera: kernel("trace_camera", camera),
+            trace_next: kernel("trace_next", next),
+            trace_shadow: kernel("trace_shadow", shadow),
+            clamp_indirect: (variant.has_clamp)
+                .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18])),
+        }
+    }
+}
