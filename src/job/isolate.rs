@@ -18,7 +18,7 @@ use spherule_jobs::{
 
 use super::{ChildCommand, ChildResult, Crash, JobManifest, RenderJob, RunError};
 use crate::manifest::Manifest;
-use crate::pipeline::{ImageError, ImageTask, WriteError, make_image};
+use crate::pipeline::{ImageError, ImageTask, WriteError, gpu, make_image};
 use crate::render::RenderError;
 use crate::report::FrameReport;
 
@@ -40,6 +40,8 @@ pub struct IsolatedTask {
     ceiling: Option<u64>,
     /// Number of threads; None for the default.
     pub threads: Option<u32>,
+    /// The number of the GPU that the user chose.
+    gpu: Option<usize>,
 }
 
 /// The result of a child process, one line of JSON on its standard output.
@@ -68,6 +70,9 @@ enum Outcome {
 /// The frame cannot be rendered because of the job, not of the frame.
 pub fn render_task(task: IsolatedTask) -> Result<IsolatedResult, RunError> {
     set_owner(&task.owner);
+    if let Some(number) = task.gpu {
+        gpu::choose(number);
+    }
     if let Some(ceiling) = task.ceiling {
         limit_memory(ceiling).map_err(RunError::MemoryCeiling)?;
     }
@@ -154,6 +159,7 @@ impl IsolatedRender<'_> {
             frame,
             ceiling: manifest.job.memory_ceiling.map(|limit| limit.0),
             threads: manifest.job.threads,
+            gpu: gpu::chosen(),
         }
     }
 

@@ -35,6 +35,11 @@ pub fn choose(index: usize) {
     CHOSEN.get_or_init(|| index);
 }
 
+/// The number that was chosen.
+pub fn chosen() -> Option<usize> {
+    CHOSEN.get().copied()
+}
+
 /// A line about each adapter of this machine, or why there is none.
 pub fn adapters() -> Vec<String> {
     let about = |(index, adapter): (usize, &AdapterSummary)| {

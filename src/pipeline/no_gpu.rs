@@ -12,6 +12,11 @@ const NOT_BUILT: &str = "this program was built without the renderer for GPUs: b
 /// Does nothing.
 pub const fn choose(_index: usize) {}
 
+/// Nothing was chosen.
+pub const fn chosen() -> Option<usize> {
+    None
+}
+
 /// Says that there is no renderer for adapters.
 pub fn adapters() -> Vec<String> {
     vec![NOT_BUILT.to_owned()]

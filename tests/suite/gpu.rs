@@ -76,8 +76,8 @@ mod on_a_device {
         assert_equal(&workshop, ["gpu", "cpu"]);
         let report = std::fs::read_to_string(workshop.join("gpu/report.json")).expect("a report");
         assert!(report.contains("\"driver\""), "{report}");
-        // The same bytes once more
-        workshop.render_to("again", &with(&DEVICE)).expect(0);
+        // The same bytes once more, in processes that take the same device
+        workshop.render_to("again", &with(&[&DEVICE[..], &["--isolate"]].concat())).expect(0);
         assert_eq!(images(&workshop.join("again")), images(&workshop.join("gpu")));
     }
 

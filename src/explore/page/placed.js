@@ -458,14 +458,14 @@ function sunHandles() {
   const radius = dial.clientWidth / 2;
   const middle = [dial.offsetLeft + dial.clientLeft + radius, dial.offsetTop + dial.clientTop + radius];
   return suns.map(({ key, name, elevation, azimuth, lowest, set }) => {
-    const out = (radius * (90 - Math.max(0, elevation))) / 90;
+    const out = (radius * (90 - elevation)) / 90; // a sun below the horizon is outside of the dial
     const at = [middle[0] + out * Math.cos(radians(azimuth)), middle[1] + out * Math.sin(radians(azimuth))];
     const text = `elevation ${Math.round(elevation)} degrees, azimuth ${Math.round(azimuth)} degrees`;
     return {
       key, kind: "sun", name: `${name}, ${text}; drag it, or turn it with arrow keys`, at,
       values: { min: lowest, max: 90, now: Math.round(elevation), text },
       begin: () => at,
-      drag: (start, by, how) => set(sunAt(add(add(start, by), middle, -1), radius), how),
+      drag: (start, by, how) => set(sunAt(add(add(start, by), middle, -1), radius, lowest), how),
       press: ({ key: pressed, shiftKey }) => {
         const step = ARROWS[pressed];
         if (!step) return false;
@@ -477,9 +477,9 @@ function sunHandles() {
   });
 }
 
-/// The sun at a place of the dial, relative to its middle.
-const sunAt = ([x, y], radius) => ({
-  elevation: Math.round(90 * (1 - Math.min(1, Math.hypot(x, y) / radius))),
+/// The sun at a place of the dial, relative to its middle; `lowest` is its least elevation.
+const sunAt = ([x, y], radius, lowest) => ({
+  elevation: Math.round(Math.max(lowest, 90 * (1 - Math.hypot(x, y) / radius))),
   azimuth: Math.round(turnOf(degrees(Math.atan2(y, x)))) % 360,
 });
 

@@ -251,7 +251,7 @@ fn rising_ozone(point: Point) -> f64 {
 }
 
 /// Irradiance (linear RGB, W/m2 of light that is weighted as the eye does) on a surface that faces the sun, whose elevation
-/// has the sine `rise`, through air of a `turbidity`. A sun below the horizon has none.
+/// has the sine `rise`, through air of a `turbidity`. A sun whose whole disc is below the horizon has none.
 pub(super) fn sun_irradiance(rise: f64, turbidity: f32) -> Vec3 {
     let point = Point::on_ground(rise);
     let visible = point.visible_sun();

@@ -80,7 +80,8 @@ impl ClearSky {
         Self { table, exposure, sun: sun_of(settings), ground: settings.albedo * light }
     }
 
-    /// Irradiance of the sun on a surface that faces it, linear RGB. A sun below the horizon has none.
+    /// Irradiance of the sun on a surface that faces it, linear RGB. A sun more than 0.27 degrees below
+    /// the horizon has none.
     pub fn sun(&self) -> Vec3 {
         self.exposure * self.sun
     }
