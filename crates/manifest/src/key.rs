@@ -23,6 +23,8 @@ pub(super) enum Affects {
     EnvironmentImage,
     /// The channel for light groups.
     LightGroups,
+    /// A limit of noise.
+    NoiseLimit,
 }
 
 impl Affects {
@@ -45,6 +47,7 @@ impl Affects {
                 "Changes images of `integrator = \"path\"` with an image as environment."
             }
             Self::LightGroups => "Changes images with the channel `light_groups`.",
+            Self::NoiseLimit => "Changes images with `render.noise`.",
         }
     }
 }

@@ -469,6 +469,7 @@ impl Manifest {
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
             Affects::Sky => self.has_environment(EnvironmentKind::Sky),
             Affects::EnvironmentImage => self.has_environment(EnvironmentKind::Image),
+            Affects::NoiseLimit => self.render.noise.is_some(),
             Affects::LightGroups => {
                 let channel = Channel::plane(FilmPlane::LightGroups);
                 self.output.channels.contains(&channel)

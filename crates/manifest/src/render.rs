@@ -42,7 +42,7 @@ section! {
         /// Samples per pixel
         samples: u32 = 16, from(1), to(MAX_SAMPLES), flag("samples", "SAMPLES", "Image");
         /// Maximum number of samples per pixel, where render.noise limits noise
-        max_samples: u32 = DEFAULT_MAX_SAMPLES, from(1), to(MAX_SAMPLES);
+        max_samples: u32 = DEFAULT_MAX_SAMPLES, from(1), to(MAX_SAMPLES), affects(Affects::NoiseLimit);
         /// Pixel filter: box | gaussian | blackman-harris
         ///
         /// The samples of a pixel are distributed like the filter and have equal weights. A single sample is at the

@@ -22,6 +22,8 @@ const MARGIN: f64 = 1.05;
 /// The integrators of the passes, with more and more samples, and the limit of the noise.
 pub(super) struct Passes<'a> {
     pub(super) integrators: Vec<Box<dyn Integrator + 'a>>,
+    /// Samples per pixel that were asked for, which lost light is counted for.
+    pub(super) samples: u32,
     pub(super) limit: Option<NoiseLimit>,
 }
 
@@ -44,7 +46,7 @@ impl Passes<'_> {
             scratch.group.noise = Some(TileNoise::default());
             counts = counts + self.integrators[pass].render_tile(tile, stop, scratch)?;
             let noise = scratch.group.noise.take().unwrap_or_default().mean();
-            let this = Joined { samples: self.samples(pass), noise };
+            let this = Joined { samples: self.samples_of(pass), noise };
             scratch.group.pass += 1;
             // Join it with the passes before
             let all = match (joined, scratch.earlier.take()) {
@@ -63,14 +65,14 @@ impl Passes<'_> {
         }
         let all = joined?;
         let pixels = u64::from(tile.width * tile.rows);
-        counts.lost = counts.lost.of_samples(all.samples, self.samples(0));
+        counts.lost = counts.lost.of_samples(all.samples, self.samples);
         counts.samples = pixels * u64::from(all.samples);
         counts.noisy_pixels = if all.noise <= f64::from(limit.noise) { 0 } else { pixels };
         Some(counts)
     }
 
     /// Samples per pixel of a pass.
-    fn samples(&self, pass: usize) -> u32 {
+    fn samples_of(&self, pass: usize) -> u32 {
         self.integrators[pass].context().settings.samples
     }
 
@@ -83,9 +85,10 @@ impl Passes<'_> {
         // Noise falls with the root of the number of samples
         let growth = (MARGIN * excess * excess).min(MAX_GROWTH);
         let needed = f64::from(all.samples) * (growth - 1.0);
-        let most = self.samples(self.integrators.len() - 1).saturating_sub(all.samples);
-        let possible = (0..self.integrators.len()).take_while(|pass| self.samples(*pass) <= most);
-        let is_enough = |pass: &usize| f64::from(self.samples(*pass)) >= needed;
+        let most = self.samples_of(self.integrators.len() - 1).saturating_sub(all.samples);
+        let possible =
+            (0..self.integrators.len()).take_while(|pass| self.samples_of(*pass) <= most);
+        let is_enough = |pass: &usize| f64::from(self.samples_of(*pass)) >= needed;
         possible.clone().find(is_enough).or(possible.last())
     }
 }

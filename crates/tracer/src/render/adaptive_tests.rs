@@ -131,6 +131,21 @@ fn the_number_of_samples_is_bounded() {
 }
 
 #[test]
+fn lost_light_is_that_of_all_passes() {
+    let clamped = |settings: RenderSettings| {
+        let (film, counts) = picture(&RenderSettings { clamp: Some(0.5), ..settings });
+        counts.lost.part(&film.color, settings.samples)
+    };
+    let (plain, more) = (clamped(large(6, None)), clamped(large(64, None)));
+    // One pass, with an even number of samples
+    let one = clamped(large(5, Some(NoiseLimit { noise: 10.0, max_samples: 64 })));
+    assert!(plain > 1e-3 && (one / plain - 1.0).abs() < 1e-3, "{one} {plain}");
+    // Several
+    let several = clamped(large(5, Some(NoiseLimit { noise: 0.02, max_samples: 64 })));
+    assert!((several / more - 1.0).abs() < 0.2, "{several} {more}");
+}
+
+#[test]
 fn limits_out_of_range_are_errors() {
     for noise in [0.0, -1.0, f32::NAN, 11.0] {
         let settings = large(4, Some(NoiseLimit { noise, max_samples: 64 }));

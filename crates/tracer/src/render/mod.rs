@@ -251,7 +251,7 @@ pub fn render_into(
     let contexts =
         passes.iter().map(|pass| RenderContext::new(shapes.clone(), scene, source, pass));
     let (integrators, before) = integrators_of(contexts.collect(), settings, stop)?;
-    let passes = Passes { integrators, limit: settings.noise };
+    let passes = Passes { integrators, samples: settings.samples, limit: settings.noise };
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // Reuse scratch memory: there is one per thread, and all are released at the end of the image
