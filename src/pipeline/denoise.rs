@@ -34,7 +34,7 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
         width: film.width,
         height: film.height,
         views: setup.picture.eyes(),
-        samples: setup.picture.render.samples,
+        samples: setup.picture.render.least_samples(),
         is_transparent: setup.picture.render.transparent_background,
         color: &film.color,
         odd,

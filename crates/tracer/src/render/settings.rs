@@ -192,12 +192,21 @@ impl RenderSettings {
         self.channels.with_features(self.has_features)
     }
 
+    /// Least number of samples of a pixel: [`Self::samples`], or those of the first pass with a limit of noise.
+    pub const fn least_samples(&self) -> u32 {
+        match self.noise {
+            None => self.samples,
+            Some(_) if self.samples < MIN_SAMPLES => MIN_SAMPLES,
+            Some(_) => self.samples.next_multiple_of(2),
+        }
+    }
+
     /// The settings of the passes that a tile may take, with more and more samples; all are even numbers.
     pub(super) fn passes(&self) -> Vec<Self> {
         let Some(limit) = self.noise else {
             return vec![*self];
         };
-        let first = self.samples.max(MIN_SAMPLES).next_multiple_of(2);
+        let first = self.least_samples();
         let most = first.max(limit.max_samples / 2 * 2);
         let more = |samples: &u32| Some((samples + samples / 3).next_multiple_of(2));
         let fewer = std::iter::successors(Some(first), more).take_while(|samples| *samples < most);
