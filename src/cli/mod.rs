@@ -172,7 +172,7 @@ fn parse(arguments: &[OsString]) -> Result<Command, u8> {
                 print::silence();
             }
             if cli.verbose {
-                print::tell_more();
+                print::set_verbose();
             }
             return Ok(cli.command);
         }

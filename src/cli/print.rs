@@ -26,7 +26,7 @@ pub(super) enum Reader {
 static IS_VERBOSE: AtomicBool = AtomicBool::new(false);
 
 /// Prints the stages, rays and memory of pictures from now on.
-pub(super) fn tell_more() {
+pub(super) fn set_verbose() {
     IS_VERBOSE.store(true, Ordering::Relaxed);
 }
 

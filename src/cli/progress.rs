@@ -5,7 +5,7 @@ use std::io::{IsTerminal, stderr};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use clap::builder::{EnumValueParser, PossibleValue, TypedValueParser};
@@ -73,7 +73,8 @@ pub(super) struct FinishedFrames {
     pub(super) failed: Vec<i64>,
 }
 
-enum Display {
+/// How progress is shown.
+pub(super) enum Display {
     Bar(ProgressBar),
     Plain,
     Openjd,
@@ -81,22 +82,50 @@ enum Display {
     Nothing,
 }
 
+impl Display {
+    /// The display for `mode`: on a terminal, auto is what `bar` makes, and `elsewhere` otherwise.
+    pub(super) fn new(
+        mode: ProgressMode,
+        bar: impl FnOnce() -> ProgressBar,
+        elsewhere: Self,
+    ) -> Self {
+        match mode {
+            ProgressMode::Auto | ProgressMode::Plain if print::is_quiet() => Self::Nothing,
+            ProgressMode::Auto if stderr().is_terminal() => Self::Bar(bar()),
+            ProgressMode::Auto => elsewhere,
+            ProgressMode::Plain => Self::Plain,
+            ProgressMode::Openjd => Self::Openjd,
+            ProgressMode::Json | ProgressMode::None => Self::Nothing,
+        }
+    }
+
+    /// Calls `print` while there is no bar.
+    pub(super) fn above_bar(&self, print: impl FnOnce()) {
+        match self {
+            Self::Bar(bar) => bar.suspend(print),
+            _ => print(),
+        }
+    }
+
+    /// Removes the bar.
+    pub(super) fn finish(&self) {
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
 impl Progress {
     /// Progress of a run of `command` with `total` frames. `output` is the path that the user gave.
     pub(super) fn new(mode: ProgressMode, command: &str, total: usize, output: &Path) -> Self {
         let output = output.display().to_string();
         events::send("start", json!({"command": command, "total": total, "output": output}));
-        let display = match mode {
-            ProgressMode::Auto | ProgressMode::Plain if print::is_quiet() => Display::Nothing,
-            ProgressMode::Auto if stderr().is_terminal() && !print::is_verbose() => {
-                Display::Bar(bar(total))
-            }
-            ProgressMode::Auto | ProgressMode::Plain => Display::Plain,
-            ProgressMode::Openjd => Display::Openjd,
-            ProgressMode::Json | ProgressMode::None => Display::Nothing,
+        let mode = match mode {
+            ProgressMode::Auto if print::is_verbose() => ProgressMode::Plain,
+            mode => mode,
         };
         Self {
-            display,
+            display: Display::new(mode, || bar(total), Display::Plain),
             total: AtomicUsize::new(total),
             start: Instant::now(),
             finished: Mutex::default(),
@@ -191,17 +220,12 @@ impl Progress {
 
     /// Calls `print` while there is no bar.
     fn above_bar(&self, print: impl FnOnce()) {
-        match &self.display {
-            Display::Bar(bar) => bar.suspend(print),
-            _ => print(),
-        }
+        self.display.above_bar(print);
     }
 
     /// Removes the bar.
     pub(super) fn finish(self) -> FinishedFrames {
-        if let Display::Bar(bar) = &self.display {
-            bar.finish_and_clear();
-        }
+        self.display.finish();
         self.finished.into_inner().unwrap_or_else(|e| e.into_inner())
     }
 
@@ -251,10 +275,14 @@ fn bar(total: usize) -> ProgressBar {
         .with_key("left", |state: &ProgressState, text: &mut dyn fmt::Write| {
             // Writing to a string cannot fail
             let _ = text.write_str(&left(state.pos(), state.eta().as_secs_f64()));
-        })
-        .progress_chars("━╸─");
-    let bar = ProgressBar::new(total as u64).with_style(style);
-    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+        });
+    bar_with(style, total as u64)
+}
+
+/// A bar that also moves while nothing is done.
+pub(super) fn bar_with(style: ProgressStyle, total: u64) -> ProgressBar {
+    let bar = ProgressBar::new(total).with_style(style.progress_chars("━╸─"));
+    bar.enable_steady_tick(Duration::from_millis(200));
     bar
 }
 

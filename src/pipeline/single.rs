@@ -30,7 +30,7 @@ pub fn make_image(
     make_image_until(setup, sequence, task, &AtomicBool::new(false), note)
 }
 
-/// Same as [`make_image`]; `stop` ends it, and hears how many pixels are traced.
+/// Same as [`make_image`]; `stop` ends it, and receives the number of pixels that are traced.
 ///
 /// # Errors
 /// Same as [`make_image`]; [`RenderError::Interrupted`](crate::render::RenderError::Interrupted) if `stop` is raised.

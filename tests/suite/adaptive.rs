@@ -9,9 +9,7 @@ fn sampling(workshop: &Workshop, out: &str, options: &[&str]) -> serde_json::Val
     let pattern = format!("{out}/f.####.exr");
     let job = ["render", "in", "-o", &pattern, "--size", "96x54", "--samples", "4"];
     workshop.run(&[&job[..], options].concat()).expect(0);
-    let report = fs::read_to_string(workshop.join(out).join("report.json")).expect("a report");
-    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
-    report["frames"][0]["sampling"].clone()
+    workshop.report(out)["frames"][0]["sampling"].clone()
 }
 
 #[test]
@@ -30,7 +28,7 @@ fn pictures_take_as_many_samples_as_their_noise_needs() {
     assert_eq!(one, other);
     assert!(samples(&low) > 2.0 * samples(&high) && samples(&high) >= 4.0, "{low} {high}");
     assert_eq!(low["noisy"], 0.0);
-    // A limit that the maximum number cannot reach, said for each picture
+    // A limit that the maximum number cannot reach: stills print a note
     let bounded = ["--noise", "1e-4", "--set", "image.max_samples=8"];
     let most = sampling(&workshop, "most", &bounded);
     assert!(most["noisy"].as_f64() > Some(0.2), "{most}");

@@ -31,8 +31,7 @@ fn rays(workshop: &Workshop, out: &str, options: &[&str]) -> u64 {
     let pattern = format!("{out}/f.####.exr");
     let render = ["render", "job.toml", "-o", &pattern];
     workshop.run(&[&render[..], options].concat()).expect(0);
-    let report = fs::read_to_string(workshop.join(out).join("report.json")).expect("a report");
-    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    let report = workshop.report(out);
     let frames = report["frames"].as_array().expect("frames");
     let kinds = ["primary", "shadow", "reflection", "refraction"];
     let of = |frame: &serde_json::Value| -> u64 {

@@ -98,11 +98,7 @@ mod on_a_device {
         let clamped_light = |out: &str, device: &[&str]| {
             let limited = ["--set=render.clamp=0.05", "--set=output.preview=false"];
             workshop.render_to(out, &[&limited[..], device].concat()).expect(0);
-            let report = std::fs::read_to_string(workshop.join(format!("{out}/report.json")));
-            let report = report.expect("a report");
-            let (_, rest) = report.split_once("\"clamped_light\":").expect("a number");
-            let number: String = rest.chars().take_while(|c| !matches!(c, ',' | '}')).collect();
-            number.trim().parse::<f64>().expect("a number")
+            workshop.report(out)["frames"][0]["clamped_light"].as_f64().expect("a number")
         };
         let gpu = clamped_light("gpu", &DEVICE);
         let cpu = clamped_light("cpu", &["--device=cpu"]);

@@ -117,8 +117,6 @@ fn trajectories_have_the_names_of_their_topology() {
     {
         let options = ["--topology", topology, "--radius=0.1", "--where", condition];
         render(&shop, "double.trr", &options).expect(0);
-        let text = fs::read_to_string(shop.join("out/report.json")).expect("a report");
-        let report: Value = serde_json::from_str(&text).expect("JSON");
-        assert_eq!(report["totals"]["particles"], 8, "{topology}");
+        assert_eq!(shop.report("out")["totals"]["particles"], 8, "{topology}");
     }
 }

@@ -4,8 +4,6 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 
-use serde_json::Value;
-
 use crate::harness::Workshop;
 use crate::picture::Picture;
 
@@ -28,8 +26,7 @@ const OPTIONS: [&str; 4] = ["--radius", "0.4", "--channels", "RGBA,id"];
 
 /// The numbers of particles that are drawn and that are read, from `report.json`.
 fn counts(workshop: &Workshop, out: &str) -> [u64; 2] {
-    let text = fs::read_to_string(workshop.join(out).join("report.json")).expect("a report");
-    let report: Value = serde_json::from_str(&text).expect("JSON");
+    let report = workshop.report(out);
     ["particles", "particles_read"].map(|key| {
         let number = report["totals"][key].as_u64();
         number.unwrap_or_else(|| panic!("no {key}: {report}"))

@@ -48,8 +48,7 @@ fn jobs_with_spray(surface: &str, caustics: &[&str]) {
     render("many", &["--threads", "3"]);
     assert!(expected == images(&shop.join("many")), "resuming changes the image");
 
-    let report = fs::read_to_string(shop.join("one/report.json")).expect("a report");
-    let report: Value = serde_json::from_str(&report).expect("JSON");
+    let report = shop.report("one");
     let frames = report["frames"].as_array().expect("frames");
     assert_eq!(frames.len(), 3);
     let seconds = |frame: &Value| frame["seconds"]["surface"].as_f64();

@@ -1,8 +1,10 @@
 //! Running the program in a directory of its own and looking at what it left.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use serde_json::Value;
 use tempfile::TempDir;
 
 mod frames;
@@ -61,6 +63,13 @@ impl Workshop {
         let pattern = format!("{out}/f.####.exr");
         let arguments = [&["render", "in", "-o", &pattern][..], &SMALL, options].concat();
         self.run(&arguments)
+    }
+
+    /// What the job in the directory `out` wrote of itself: `report.json`.
+    #[track_caller]
+    pub(crate) fn report(&self, out: &str) -> Value {
+        let bytes = fs::read(self.join(out).join("report.json")).expect("a report");
+        serde_json::from_slice(&bytes).expect("JSON")
     }
 
     /// Starts the program and leaves it running.

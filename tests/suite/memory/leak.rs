@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::{AWAY, report};
+use super::AWAY;
 use crate::harness::{Workshop, npy};
 
 /// Bytes that each frame may take for good: the job keeps what the report will say of it, as text of
@@ -25,7 +25,7 @@ fn flat(particles: usize, options: &[&str]) {
     }
     let common = ["render", "in", "-o", "out/f.####.exr", "--samples", "1"];
     workshop.run(&[&common[..], options].concat()).expect(0);
-    let report = report(&workshop);
+    let report = workshop.report("out");
     let frames = report["frames"].as_array().expect("frames");
     let after: Vec<f64> = frames
         .iter()

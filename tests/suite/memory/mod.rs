@@ -8,7 +8,7 @@ use serde_json::Value;
 use spherule_formats::generate::{BoxSettings, fill_box};
 use spherule_formats::{Attribute, AttributeData, write};
 
-use crate::harness::{Ran, Workshop};
+use crate::harness::Ran;
 
 #[cfg(target_os = "linux")]
 mod bombs;
@@ -59,11 +59,4 @@ fn vtk(path: &Path, count: usize, with_attributes: bool) {
 #[track_caller]
 fn answer(ran: &Ran) -> Value {
     serde_json::from_str(&ran.text()).unwrap_or_else(|e| panic!("{e}: {}", ran.text()))
-}
-
-/// What the run wrote of itself.
-#[track_caller]
-fn report(workshop: &Workshop) -> Value {
-    let bytes = fs::read(workshop.join("out/report.json")).expect("a report");
-    serde_json::from_slice(&bytes).expect("JSON")
 }

@@ -15,7 +15,7 @@ use glam::{DVec3, Vec3};
 use spherule_formats::convert::{BlockSettings, BlockSource, ParticleSource};
 use spherule_formats::{ParticleFrame, Positions, RawParticles, native, write};
 
-use super::{AWAY, answer, particles, report, vtk};
+use super::{AWAY, answer, particles, vtk};
 use crate::harness::Workshop;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
@@ -49,7 +49,8 @@ fn peaks(name: &str, make: impl Fn(&Path), options: &[&str]) -> (f64, f64) {
     workshop.run(&arguments("render")).expect(0);
     let predicted = &answer(&check)["memory"];
     let total = predicted["total"].as_f64().expect("bytes");
-    let measured = report(&workshop)["totals"]["rss"]["anonymous_peak"].as_f64().expect("bytes");
+    let measured =
+        workshop.report("out")["totals"]["rss"]["anonymous_peak"].as_f64().expect("bytes");
     (total, measured)
 }
 

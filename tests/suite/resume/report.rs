@@ -6,11 +6,6 @@ use serde_json::Value;
 
 use crate::harness::{Workshop, dam_break};
 
-fn report(workshop: &Workshop) -> Value {
-    let bytes = fs::read(workshop.join("out/report.json")).expect("a report");
-    serde_json::from_slice(&bytes).expect("JSON")
-}
-
 fn page(workshop: &Workshop) -> String {
     fs::read_to_string(workshop.join("out/report.html")).expect("a page")
 }
@@ -36,7 +31,7 @@ fn frames_totals_settings_and_machine() {
     let good = fs::read(&file).expect("a frame");
     fs::write(&file, &good[..100]).expect("a file");
     workshop.render(&["--frames", "1-3", "--threads", "2"]).expect(1);
-    let first = report(&workshop);
+    let first = workshop.report("out");
     has(&first, &["frames", "totals", "slowest", "settings", "machine"]);
     let frames = first["frames"].as_array().expect("frames");
     let status: Vec<&str> = frames.iter().filter_map(|f| f["status"].as_str()).collect();
@@ -72,7 +67,7 @@ fn frames_totals_settings_and_machine() {
     // It tells of the whole job, not of the last run.
     fs::write(&file, good).expect("a file");
     workshop.render(&["--threads", "2"]).expect(0);
-    let second = report(&workshop);
+    let second = workshop.report("out");
     let frames = second["frames"].as_array().expect("frames");
     assert!(frames.iter().all(|f| f["status"] == "done"));
     assert_eq!(frames[0], first["frames"][0]);
@@ -109,7 +104,7 @@ fn lost_images_are_not_called_done() {
     workshop.render(&[]).expect(0);
     fs::remove_file(workshop.join("out/f.0002.exr")).expect("an image");
     workshop.render(&["--frames", "1"]).expect(0);
-    let report = report(&workshop);
+    let report = workshop.report("out");
     assert_eq!(report["frames"][0]["status"], "done");
     assert_eq!(report["frames"][1]["status"], "pending");
     assert_eq!(report["frames"][1]["particles"], Value::Null);

@@ -34,8 +34,7 @@ fn workers_started_at_once_make_each_frame_once() {
     assert!(images(&out) == images(&workshop.join("whole")));
     let lines = ledger(&out).lines;
     assert_eq!(lines.len(), FRAMES, "{lines:?}");
-    let report = fs::read_to_string(out.join("report.json")).expect("a report");
-    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    let report = workshop.report("out");
     let frames = report["frames"].as_array().expect("frames");
     assert!(frames.iter().all(|f| f["status"] == "done"), "all workers' frames are in it");
 }

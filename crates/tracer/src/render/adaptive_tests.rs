@@ -1,28 +1,15 @@
-//! Tiles that take more samples than others.
+//! Tiles that take more samples than others: in pictures of fireflies, those near the ball are noisy, and those far away are
+//! not.
 
 use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
-use super::path_tests::{floor_from_above, settings};
+use super::clamp_tests::{METAL, fireflies};
+use super::path_tests::settings;
 use super::{brute::Balls, *};
-use crate::scene::{Environment, Finish, Light, LightKind};
 
-/// A metal ball under a sun in a grey sky: the floor near the ball is noisy, and that far away is not.
-fn scene() -> Scene {
-    let mut scene = floor_from_above(Environment::constant(Vec3::splat(0.2)), Vec3::splat(0.5));
-    scene.particle_material_mut().finish = Finish::Metal { roughness: 0.2 };
-    scene.lights = vec![Light {
-        kind: LightKind::Sun { to_light: Vec3::new(1.0, 0.3, 1.0).normalize(), half_angle: 0.02 },
-        radiance: Vec3::splat(3.0),
-        casts_shadow: true,
-        is_visible: true,
-        group: 1,
-    }];
-    scene
-}
-
-/// A picture of several tiles, the last of which are not whole.
+/// A picture of several tiles; those at its right and its lower edge are smaller.
 fn large(samples: u32, noise: Option<NoiseLimit>) -> RenderSettings {
     let mut channels =
         Channels::from_names(["RGBA", "Z", "id", "lights", "crypto_material"]).unwrap();
@@ -39,7 +26,7 @@ fn large(samples: u32, noise: Option<NoiseLimit>) -> RenderSettings {
 
 fn picture(settings: &RenderSettings) -> (Film, RayCounts) {
     let (ball, source) = (Balls::one(Vec3::new(0.0, 0.0, 0.4), 0.4), Vec3::splat(0.8));
-    let (scene, never) = (scene(), AtomicBool::new(false));
+    let (scene, never) = (fireflies(METAL), AtomicBool::new(false));
     render(&[&ball], &scene, &ParticleShading::constant(source), settings, &never).unwrap()
 }
 

@@ -10,7 +10,7 @@ use super::{brute::Balls, solid::Solid, *};
 use crate::scene::{Environment, Finish, Light, LightKind};
 
 /// A metal ball under a sun in a grey sky: the floor has fireflies, samples that meet the sun in the metal.
-fn scene(finish: Finish) -> Scene {
+pub(super) fn fireflies(finish: Finish) -> Scene {
     let mut scene = floor_from_above(Environment::constant(Vec3::splat(0.2)), Vec3::splat(0.5));
     scene.particle_material_mut().finish = finish;
     scene.lights = vec![Light {
@@ -23,7 +23,7 @@ fn scene(finish: Finish) -> Scene {
     scene
 }
 
-const METAL: Finish = Finish::Metal { roughness: 0.2 };
+pub(super) const METAL: Finish = Finish::Metal { roughness: 0.2 };
 
 fn ball() -> Balls {
     Balls::one(Vec3::new(0.0, 0.0, 0.8), 0.6)
@@ -42,7 +42,7 @@ fn sum(film: &Film) -> f64 {
 
 #[test]
 fn what_is_lost_is_counted() {
-    let scene = scene(METAL);
+    let scene = fireflies(METAL);
     let settings = settings(32, 16, 6);
     let (free, none) = clamped(&ball(), &scene, &settings);
     assert_eq!(none, LostLight::NONE);
@@ -63,7 +63,7 @@ fn what_is_lost_is_counted() {
 fn direct_light_has_no_limit() {
     let glossy = Finish::Plastic { roughness: 0.1 };
     for finish in [Finish::Metal { roughness: 0.0 }, METAL, glossy, Finish::Matte] {
-        let mut scene = scene(finish);
+        let mut scene = fireflies(finish);
         scene.ground = None;
         let settings = settings(24, 8, 6);
         // One convex body alone receives no other light
@@ -77,7 +77,7 @@ fn direct_light_has_no_limit() {
 #[test]
 fn light_groups_lose_the_same_part() {
     for (material, shape) in [(METAL, &ball() as &dyn Shape), (Finish::Matte, &Solid::ball(0.6))] {
-        let mut scene = scene(material);
+        let mut scene = fireflies(material);
         if material == Finish::Matte {
             *scene.particle_material_mut() = GLASS;
         }

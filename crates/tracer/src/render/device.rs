@@ -18,7 +18,6 @@ use super::{
     context::RenderContext,
     cryptomatte::rank,
     film::{Film, FilmTile, bounded},
-    layers::MatteKind,
     planes::FilmPlane,
     settings::{RenderError, RenderSettings},
     source::ShadeSource,
@@ -73,9 +72,8 @@ pub trait DevicePixels: Sync {
 
 /// Whether [`store_pixels`] fills all planes of `channels`: those of the nearest sample of each pixel, and of Cryptomatte.
 pub fn stores_all(channels: &Channels) -> bool {
-    let is_matte = |plane: FilmPlane| MatteKind::ALL.iter().any(|kind| kind.plane() == plane);
     let mut planes = FilmPlane::all().filter(|plane| channels.has(*plane));
-    planes.all(|plane| plane.is_from_nearest() || is_matte(plane))
+    planes.all(|plane| plane.is_from_nearest() || plane.is_matte())
 }
 
 /// Makes `film` a picture of `scene` with these settings and `pixels`.

@@ -4,7 +4,7 @@ use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::cryptomatte::rank;
 use super::film::{FilmTile, PerPlane, Rows, bounded};
-use super::planes::{Components, FilmPlane};
+use super::planes::FilmPlane;
 
 /// The planes of a tile after a pass, row by row.
 pub(super) struct TilePass {
@@ -48,7 +48,7 @@ impl FilmTile<'_> {
                 }
                 let (later, earlier): (&mut [f32], &[f32]) =
                     (cast_slice_mut(later), cast_slice(earlier));
-                if plane.components() == Components::Levels {
+                if plane.is_matte() {
                     covered.clear();
                     add_objects(&mut covered, earlier, share);
                     add_objects(&mut covered, later, 1.0 - share);

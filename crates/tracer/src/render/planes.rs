@@ -206,6 +206,11 @@ impl FilmPlane {
         }
     }
 
+    /// Whether it is one of Cryptomatte: objects and their coverages.
+    pub(super) const fn is_matte(self) -> bool {
+        matches!(self.components(), Levels)
+    }
+
     /// The value of a pixel without an intersection: the bits of all components.
     pub(super) const fn miss(self) -> u32 {
         match self.kind() {

@@ -3,7 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// A stop request, and what is told about the progress. All threads check it often, so the check must be cheap; once raised, it must stay raised.
+/// A stop request, which also receives the progress of a picture. All threads check it often, so the check must be cheap;
+/// once raised, it must stay raised.
 pub trait Stop: Sync {
     /// Whether to stop.
     fn is_raised(&self) -> bool;
