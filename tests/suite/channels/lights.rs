@@ -75,6 +75,11 @@ fn light_channels_of_path_add_up() {
     check(&workshop, &[&studio[..], &MATTE].concat(), &["diffuse", "background"]);
     let plastic = ["--set", "material.type=\"plastic\""];
     check(&workshop, &[&studio[..], &plastic].concat(), &["diffuse", "specular", "background"]);
+    // One pass of adaptive sampling above a shadow catcher, and several, which are joined
+    for noise in ["5", "0.1"] {
+        let options = [&studio[..], &MATTE, &["--noise", noise]].concat();
+        check(&workshop, &options, &["diffuse", "background"]);
+    }
     let metal = ["--set", "material.type=\"metal\"", "--set", "output.transparent=true"];
     check(&workshop, &[&studio[..], &metal].concat(), &["specular"]);
     let water = ["--look", "water"];

@@ -60,9 +60,6 @@ impl Passes<'_> {
             number = self.next(all, limit);
             scratch.earlier = number.map(|_| tile.pass());
         }
-        if self.integrators[0].context().catches_shadows() {
-            tile.bound();
-        }
         let all = joined?;
         let pixels = u64::from(tile.width * tile.rows);
         counts.lost = counts.lost.of_samples(all.samples, self.samples);

@@ -3,7 +3,7 @@
 use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::cryptomatte::rank;
-use super::film::{FilmTile, PerPlane, Rows, bounded};
+use super::film::{FilmTile, PerPlane, Rows};
 use super::planes::FilmPlane;
 
 /// The planes of a tile after a pass, row by row.
@@ -56,15 +56,6 @@ impl FilmTile<'_> {
                 } else {
                     later.iter_mut().zip(earlier).for_each(|(later, earlier)| mix(later, earlier));
                 }
-            }
-        }
-    }
-
-    /// Makes no colour negative, and the coverage a part, which samples of shadow catchers are not one by one.
-    pub(super) fn bound(&mut self) {
-        for rows in [Some(&mut self.color), self.odd.as_mut()].into_iter().flatten() {
-            for color in rows.iter_mut().flat_map(|row| row.iter_mut()) {
-                *color = bounded(*color, true);
             }
         }
     }
@@ -122,13 +113,5 @@ mod tests {
             assert!(*object == to && (coverage - of).abs() < 1e-6, "{found:?}");
         }
         assert_eq!(found[3], (0, 0.0));
-    }
-
-    #[test]
-    fn tiles_are_bounded() {
-        let mut film = film(-1.0, 5, [0.0; 4]);
-        film.bands_mut(1)[0].tiles(1)[0].bound();
-        assert_eq!(film.color, [[0.0, 0.0, 0.0, 1.0]]);
-        assert_eq!(film.odd.unwrap()[0][0], 0.0);
     }
 }

@@ -75,8 +75,7 @@ pub(super) trait Integrator: Sync {
             let group = pixels.by_ref().take(group_len);
             context.place_samples(tile, group, &mut scratch.group);
             trace_group(self, stop, scratch)?;
-            // Passes are bounded when they are joined
-            let is_bounded = context.catches_shadows() && scratch.group.noise.is_none();
+            let is_bounded = context.catches_shadows();
             scratch.group.accumulate(samples, is_bounded, tile);
             context.store_attributes(&scratch.group.pixels, tile);
         }
