@@ -29,7 +29,8 @@ pub(super) struct ManifestArgs {
 
     /// Quick preview: 4 samples per pixel, ambient light instead of light between surfaces
     ///
-    /// Sets image.samples = 4, render.indirect = "ambient" and render.denoise = "auto", whatever the manifest says;
+    /// Sets image.samples = 4, render.noise = "off", render.indirect = "ambient" and render.denoise = "auto", whatever the
+    /// manifest says;
     /// other options override them.
     #[arg(long, help_heading = "Look", display_order = 0)]
     pub(super) draft: bool,

@@ -33,8 +33,10 @@ impl ValueEnum for ModeArgument {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.0.name()).help(match self.0 {
-            ProgressMode::Auto => "Bars on a terminal, plain lines elsewhere",
-            ProgressMode::Plain => "One line per frame",
+            ProgressMode::Auto => {
+                "Bars on a terminal; elsewhere plain lines for jobs, nothing for stills"
+            }
+            ProgressMode::Plain => "One line per frame, or for each tenth of a still",
             ProgressMode::Json => "JSON events, one per line, on standard output",
             ProgressMode::Openjd => "Messages for Open Job Description engines",
             ProgressMode::None => "Only warnings and errors",

@@ -474,7 +474,7 @@ fn reduced(setup: &Setup, level: &Level) -> Setup {
     // The picture is refined level by level, all of it alike
     render.noise = None;
     // The noise of one sample cannot be measured
-    if level.samples == 1 && !level.is_last {
+    if level.samples == 1 {
         render.has_features = false;
         setup.picture.denoise = None;
     }

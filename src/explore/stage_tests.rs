@@ -131,6 +131,12 @@ fn drafts_are_small_and_refused_settings_name_their_key() {
         let fault = error.fault();
         assert!(fault.message.contains(key.rsplit('.').next().expect("a part")), "{fault:?}");
     }
+    // A limit of noise does not change the number of samples, and a single one is not denoised
+    stage
+        .prepare(&[set("render.noise", json!(0.1)), set("image.samples", json!(1))])
+        .expect("valid");
+    let last = Level { is_last: true, ..level };
+    stage.picture(FRAME, &last, &AtomicBool::new(false)).expect("a picture");
     // A raised stop, and a frame that is not there
     stage.prepare(&[]).expect("valid");
     let stopped = stage.picture(FRAME, &level, &AtomicBool::new(true)).err();

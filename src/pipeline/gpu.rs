@@ -75,7 +75,9 @@ fn device() -> Result<Arc<Device>, TraceError> {
             hardware.ok_or_else(|| no_device(&adapters))?
         }
     };
-    let device = Arc::new(Device::open(index, Checks::Off).map_err(failed)?);
+    // `failed` would wait for the lock
+    let opened = Device::open(index, Checks::Off);
+    let device = Arc::new(opened.map_err(|error| TraceError::Device(error.to_string()))?);
     *shared = Some(Arc::clone(&device));
     Ok(device)
 }

@@ -81,6 +81,15 @@ mod on_a_device {
         assert_eq!(images(&workshop.join("again")), images(&workshop.join("gpu")));
     }
 
+    #[test]
+    fn progress_of_stills_is_complete() {
+        let Some(workshop) = workshop_with_device() else { return };
+        let still = ["still", "in", "-o", "a.png", "--progress", "json"];
+        let ran = workshop.run(&[&still[..], &SMALL, &DEVICE].concat()).expect(0);
+        let percents = ran.text().matches("\"progress\"").count();
+        assert_eq!(percents, 100, "{}", ran.text());
+    }
+
     /// The default look: studio, shadow catcher, colours by speed, denoised.
     #[test]
     fn the_default_look_is_that_of_the_cpu() {

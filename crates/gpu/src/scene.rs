@@ -263,6 +263,7 @@ impl SceneRenderer {
             store_pixels(film, scene, source, settings, &pixels)
         };
         self.renderer.read(&self.device, store)??;
+        stop.pixels_done(settings.width * settings.height);
         Ok(self.renderer.cost(&self.device)?)
     }
 

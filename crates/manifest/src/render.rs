@@ -54,7 +54,7 @@ section! {
         /// Part of the image to render: [x0, y0, x1, y1] in pixels, from the top left, without column x1 and row y1
         ///
         /// Its pixels are those of the whole image. With denoising, they may differ near its border, where the denoiser
-        /// lacks the neighbours. The part is the data window of the EXR; previews show only the part.
+        /// lacks the neighbours; with render.noise, everywhere, because tiles begin at the corner of the part. The part is the data window of the EXR; previews show only the part.
         crop: Option<PixelBounds> = None, example("[0, 0, 960, 540]"), unset("the whole image"),
             flag("crop", "X0,Y0,X1,Y1", "Image");
         /// Pixels to add on each side of the image; they extend the data window of the EXR
@@ -271,8 +271,9 @@ section! {
         /// Limit of noise: tiles of 16x16 pixels take more samples until their noise is below it, or off
         ///
         /// The noise is measured before denoising, and relative to white: 0.02 is hardly seen, 0.1 suits pictures that are
-        /// denoised. A tile takes at least image.samples and at most image.max_samples. It is an estimate, which rare
-        /// bright samples escape.
+        /// denoised. A tile takes at least image.samples, rounded up to an even number of at least 4, and at most
+        /// image.max_samples; another pass has at least as many as the first one. It is an estimate, which rare bright samples
+        /// escape.
         noise: Option<f32> = None, or("off"), above(0), to(MAX_NOISE), unit("a part of white"), flag("noise", "LIMIT", "Look");
         /// Sequence of the random numbers
         ///
