@@ -40,7 +40,14 @@ fn pictures_take_as_many_samples_as_their_noise_needs() {
     workshop
         .run(&[&["still", "in", "--size", "96x54", "-o", "a.png"], &one[..]].concat())
         .expect(0);
-    // Drafts have a fixed number
+    // What is asked for, and what a maximum below it says
+    let range = ["check", "in", "-o", "r/f.####.exr", "--samples", "5", "--noise", "0.04"];
+    let shown = workshop.run(&range).expect(0);
+    assert!(shown.text().contains(", 6 to 1024 samples (noise 0.04)"), "{}", shown.text());
+    let below = workshop.run(&[&range[..], &["--set", "image.max_samples=4"]].concat()).expect(2);
+    let expected = "image.max_samples=4: 4 is below image.samples, which is 5";
+    assert!(below.errors().contains(expected), "{}", below.errors());
+    // Drafts have a fixed number, unless an option overrides it
     assert!(sampling(&workshop, "draft", &["--noise", "0.04", "--draft"]).is_object());
     fs::write(workshop.join("job.toml"), "input.path = \"in\"\nrender.noise = 0.04\n").unwrap();
     let plan = workshop.run(&["check", "job.toml", "--draft", "-o", "d/f.####.exr"]).expect(0);

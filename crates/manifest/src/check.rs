@@ -128,6 +128,18 @@ impl Manifest {
         }
         self.check_branches(root);
         self.check_styles(root);
+        self.check_noise(root);
+    }
+
+    /// Checks that tiles may have as many samples as they have at least.
+    fn check_noise(&self, root: &mut Section<'_>) {
+        let least = self.image.samples;
+        if let Some(most) = self.image.max_samples.filter(|_| self.render.noise.is_some())
+            && most < least
+        {
+            let what = format!("{most} is below image.samples, which is {least}");
+            root.section("image").wrong("max_samples", &what);
+        }
     }
 
     /// Checks that thin glass has one colour, and that several clear kinds of particles are bodies, and not too many.

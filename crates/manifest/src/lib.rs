@@ -37,7 +37,7 @@ use std::path::Path;
 use spherule_images::overlay::Layout;
 use spherule_selection::{Condition, Selection};
 use spherule_surface::{SprayStyle, SurfaceKind, SurfaceSettings};
-use spherule_tracer::render::{FilmPlane, IntegratorKind, NoiseLimit};
+use spherule_tracer::render::{DEFAULT_MAX_SAMPLES, FilmPlane, IntegratorKind, NoiseLimit};
 use spherule_tracer::scene::Fresnel;
 
 use key::Affects;
@@ -431,7 +431,7 @@ impl Manifest {
 
     /// The limit of noise, if there is one.
     pub fn noise_limit(&self) -> Option<NoiseLimit> {
-        let max_samples = self.image.max_samples;
+        let max_samples = self.image.max_samples.unwrap_or(DEFAULT_MAX_SAMPLES);
         self.render.noise.map(|noise| NoiseLimit { noise, max_samples })
     }
 

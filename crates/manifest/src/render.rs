@@ -4,7 +4,7 @@ use glam::Vec3;
 use spherule_files::Bytes;
 use spherule_images::overlay::Layout;
 use spherule_tracer::render::{
-    DEFAULT_BOUNCES, DEFAULT_MAX_SAMPLES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind,
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind,
     IntegratorKind, MAX_BOUNCES, MAX_CLAMP, MAX_DEPTH, MAX_FILTER_WIDTH, MAX_NOISE, MAX_SAMPLES,
     MAX_SEED, MAX_SIDE, MIN_WEIGHTS, RendererKind,
 };
@@ -42,7 +42,8 @@ section! {
         /// Samples per pixel
         samples: u32 = 16, from(1), to(MAX_SAMPLES), flag("samples", "SAMPLES", "Image");
         /// Maximum number of samples per pixel, where render.noise limits noise
-        max_samples: u32 = DEFAULT_MAX_SAMPLES, from(1), to(MAX_SAMPLES), affects(Affects::NoiseLimit);
+        max_samples: Option<u32> = None, from(1), to(MAX_SAMPLES), example("256"),
+            unset("1024, or image.samples if that is more"), affects(Affects::NoiseLimit);
         /// Pixel filter: box | gaussian | blackman-harris
         ///
         /// The samples of a pixel are distributed like the filter and have equal weights. A single sample is at the
@@ -54,7 +55,8 @@ section! {
         /// Part of the image to render: [x0, y0, x1, y1] in pixels, from the top left, without column x1 and row y1
         ///
         /// Its pixels are those of the whole image. With denoising, they may differ near its border, where the denoiser
-        /// lacks the neighbours; with render.noise, everywhere, because tiles begin at the corner of the part. The part is the data window of the EXR; previews show only the part.
+        /// lacks the neighbours; with render.noise, everywhere, because tiles begin at the corner of the part. The part is
+        /// the data window of the EXR; previews show only the part.
         crop: Option<PixelBounds> = None, example("[0, 0, 960, 540]"), unset("the whole image"),
             flag("crop", "X0,Y0,X1,Y1", "Image");
         /// Pixels to add on each side of the image; they extend the data window of the EXR
@@ -272,8 +274,7 @@ section! {
         ///
         /// The noise is measured before denoising, and relative to white: 0.02 is hardly seen, 0.1 suits pictures that are
         /// denoised. A tile takes at least image.samples, rounded up to an even number of at least 4, and at most
-        /// image.max_samples; another pass has at least as many as the first one. It is an estimate, which rare bright samples
-        /// escape.
+        /// image.max_samples. It is an estimate, which rare bright samples escape.
         noise: Option<f32> = None, or("off"), above(0), to(MAX_NOISE), unit("a part of white"), flag("noise", "LIMIT", "Look");
         /// Sequence of the random numbers
         ///

@@ -14,7 +14,7 @@ use crate::cli::progress::duration;
 use crate::cli::render::{radius_text, unframed_text};
 use crate::manifest::{Channel, Manifest, NamedChannel};
 use crate::pipeline::{ColorRule, Overlap, Probe, RadiusRule, Schedule, Setup, gpu};
-use crate::render::RendererKind;
+use crate::render::{NoiseLimit, RendererKind};
 use crate::scene::RadiusTable;
 use crate::survey::{Survey, shown_name};
 
@@ -222,19 +222,25 @@ fn samples_text(manifest: &Manifest) -> String {
     match manifest.noise_limit() {
         None => counted(samples as usize, "sample"),
         Some(limit) => {
-            let most = limit.max_samples.max(samples);
-            format!("{samples} to {most} samples (noise {})", limit.noise)
+            let least = NoiseLimit::least_samples(samples);
+            let most = limit.most_samples(least);
+            format!("{least} to {most} samples (noise {})", limit.noise)
         }
     }
 }
 
 fn image_json(manifest: &Manifest) -> Value {
     let [width, height] = manifest.picture().size();
+    let limit = manifest.noise_limit();
+    let samples = manifest.image.samples;
+    let least = limit.map_or(samples, |_| NoiseLimit::least_samples(samples));
     let mut image = json!({
         "width": width,
         "height": height,
-        "samples": manifest.image.samples,
-        "noise": manifest.render.noise,
+        "samples": least,
+        "max_samples": limit.map(|limit| limit.most_samples(least)),
+        // The digits of the shorter type
+        "noise": limit.and_then(|limit| limit.noise.to_string().parse::<f64>().ok()),
         "channels": channels(manifest),
         "preview": manifest.output.has_previews(),
     });

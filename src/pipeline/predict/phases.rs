@@ -3,7 +3,7 @@
 use super::super::mattes;
 use super::{FrameSize, MemoryModel, MemoryNeed, Neighbours};
 use crate::denoise;
-use crate::render::{GroundLightBytes, ground_light_bytes};
+use crate::render::{GroundLightBytes, ground_light_bytes, sampler_bytes};
 use crate::scene::Ground;
 use crate::scene::ground::Pattern;
 use crate::surface::SurfaceKind;
@@ -12,7 +12,7 @@ use crate::surface::mesh::MeshTree;
 /// Memory of the program: its data, the stacks of its threads and small allocations; large allocations are returned
 /// to the system when they are freed. Measured on sequences of up to 1e6 particles, as the remainder of the other
 /// parts.
-const PROGRAM: u64 = 3 << 20;
+const PROGRAM: u64 = 5 << 20;
 /// Additional memory per thread.
 const THREAD: u64 = 256 << 10;
 
@@ -128,7 +128,7 @@ impl MemoryModel<'_> {
         let encoded = place.before.min(place.neighbours.encoders);
         let reading = place.after.map(|after| self.reading_with_meshes(after));
         MemoryNeed {
-            program: idle.program + self.floor().kept,
+            program: idle.program + self.floor().kept + sampler_bytes(&picture.render),
             reading: reading.map_or(idle.reading, |reading| reading.max(idle.reading)),
             particles: self.shading(frame),
             // Spheres in motion have a tree of their own instead

@@ -169,28 +169,34 @@ fn few_particles_in_a_large_image() {
 }
 
 #[test]
+fn passes_with_more_samples_have_points_of_their_own() {
+    let options = [&SMALL[..], &["--noise", "0.1"]].concat();
+    compare("npy", |path| npy(path, 50_000), &options);
+}
+
+#[test]
 fn many_attributes_and_all_channels() {
     let options = [&LARGE[..], &ALL].concat();
-    compare("vtk", |path| vtk(path, 300_000, true), &options);
+    compare("vtk", |path| vtk(path, 200_000, true), &options);
 }
 
 #[test]
 fn many_particles_in_a_small_image() {
-    compare("spf", |path| spf(path, 600_000), &SMALL);
-    compare("vtk", |path| vtk(path, 600_000, false), &SMALL);
+    compare("spf", |path| spf(path, 400_000), &SMALL);
+    compare("vtk", |path| vtk(path, 400_000, false), &SMALL);
 }
 
 #[test]
 fn every_structure() {
     for structure in ["lbvh", "bvh", "sbvh", "kdtree"] {
         let options = [&SMALL[..], &["--accelerator", structure]].concat();
-        compare("npy", |path| npy(path, 300_000), &options);
+        compare("npy", |path| npy(path, 150_000), &options);
     }
 }
 
 #[test]
 fn every_particle_encoding() {
-    const COUNT: usize = 120_000;
+    const COUNT: usize = 80_000;
     compare("csv", |path| fs::write(path, csv(COUNT)).expect("a file"), &SMALL);
     compare("csv.gz", |path| gz(path, csv(COUNT).as_bytes()), &SMALL);
     compare("npy.gz", |path| gz(path, &npy_bytes(path, COUNT)), &SMALL);
@@ -201,7 +207,7 @@ fn every_particle_encoding() {
 
 #[test]
 fn every_text_format() {
-    const COUNT: usize = 120_000;
+    const COUNT: usize = 80_000;
     compare("lammpstrj.gz", |path| gz(path, dump(COUNT).as_bytes()), &SMALL);
     let write = |path: &Path, text: String| fs::write(path, text).expect("a file");
     compare("ply", |path| write(path, ply(COUNT)), &SMALL);
@@ -213,7 +219,7 @@ fn every_text_format() {
 #[test]
 fn union_uses_the_memory_of_spheres() {
     let options = [&SMALL[..], &["--surface", "union"]].concat();
-    compare("npy", |path| block(path, 250_000), &options);
+    compare("npy", |path| block(path, 150_000), &options);
 }
 
 /// As [`compare`], but the prediction may be an upper bound within 25 %.
@@ -245,19 +251,19 @@ fn splash(path: &Path, count: usize) {
 fn smooth_surfaces_are_predicted_from_the_survey() {
     let smooth = ["--surface", "smooth", "--radius", "0.01"];
     let plain = [&SMALL[..], &smooth].concat();
-    compare_bound("npy", |path| block(path, 50_000), &plain);
+    compare_bound("npy", |path| block(path, 25_000), &plain);
     let attributes = [&SMALL[..4], &smooth].concat();
-    compare_bound("npy", |path| block(path, 50_000), &attributes);
-    compare_bound("npy", |path| splash(path, 8_000), &plain);
+    compare_bound("npy", |path| block(path, 25_000), &attributes);
+    compare_bound("npy", |path| splash(path, 5_000), &plain);
     let fine = [&plain[..], &["--set", "surface.voxel=0.7"]].concat();
-    compare_bound("npy", |path| splash(path, 8_000), &fine);
+    compare_bound("npy", |path| splash(path, 5_000), &fine);
 }
 
 #[test]
 fn spray_is_predicted_from_the_survey() {
     let spray = ["--look", "water", "--radius", "0.01"];
     let options = [&SMALL[..], &spray].concat();
-    compare_bound("npy", |path| splash(path, 15_000), &options);
+    compare_bound("npy", |path| splash(path, 10_000), &options);
 }
 
 #[test]
@@ -274,7 +280,7 @@ fn frames_of_spray_alone_are_predicted() {
 fn moving_spheres_are_predicted() {
     let blur = ["--set", "camera.shutter=0.5", "--set", "output.frame_time=0.04"];
     let options = [&SMALL[..], &blur].concat();
-    compare_bound("vtk", |path| vtk(path, 250_000, true), &options);
+    compare_bound("vtk", |path| vtk(path, 150_000, true), &options);
 }
 
 /// A binary STL file of separate triangles.
@@ -296,7 +302,7 @@ fn triangles(path: &Path, count: u32) {
 fn meshes_are_predicted() {
     let directory = tempfile::tempdir().expect("a directory");
     let mesh = directory.path().join("mesh.stl");
-    triangles(&mesh, 100_000);
+    triangles(&mesh, 200_000);
     let mesh = mesh.to_str().expect("a name in UTF-8");
     let options = [&SMALL[..], &["--mesh", mesh]].concat();
     compare_bound("npy", |path| npy(path, 100_000), &options);

@@ -22,6 +22,8 @@ const MARGIN: f64 = 1.05;
 /// The integrators of the passes, with more and more samples, and the limit of the noise.
 pub(super) struct Passes<'a> {
     pub(super) integrators: Vec<Box<dyn Integrator + 'a>>,
+    /// The one of the first pass over a tile.
+    pub(super) first: usize,
     /// Samples per pixel that were asked for, which lost light is counted for.
     pub(super) samples: u32,
     pub(super) limit: Option<NoiseLimit>,
@@ -36,10 +38,10 @@ impl Passes<'_> {
         scratch: &mut Scratch,
     ) -> Option<RayCounts> {
         let Some(limit) = self.limit else {
-            return self.integrators[0].render_tile(tile, stop, scratch);
+            return self.integrators[self.first].render_tile(tile, stop, scratch);
         };
         let mut joined: Option<Joined> = None;
-        let (mut counts, mut number) = (RayCounts::default(), Some(0));
+        let (mut counts, mut number) = (RayCounts::default(), Some(self.first));
         scratch.group.pass = 0;
         while let Some(pass) = number {
             // Render the tile, and measure its noise
@@ -82,9 +84,9 @@ impl Passes<'_> {
         // Noise falls with the root of the number of samples
         let growth = (MARGIN * excess * excess).min(MAX_GROWTH);
         let needed = f64::from(all.samples) * (growth - 1.0);
-        let most = self.samples_of(self.integrators.len() - 1).saturating_sub(all.samples);
+        let left = limit.most_samples(self.samples_of(self.first)).saturating_sub(all.samples);
         let possible =
-            (0..self.integrators.len()).take_while(|pass| self.samples_of(*pass) <= most);
+            (0..self.integrators.len()).take_while(|pass| self.samples_of(*pass) <= left);
         let is_enough = |pass: &usize| f64::from(self.samples_of(*pass)) >= needed;
         possible.clone().find(is_enough).or(possible.last())
     }

@@ -108,6 +108,11 @@ fn the_number_of_samples_is_bounded() {
     assert!(counts.noisy_pixels > 0 && counts.noisy_pixels <= 90 * 70);
     let (plain, _) = picture(&large(6, None));
     assert_ne!(film.color, plain.color);
+    // A maximum below twice the least number
+    let limit = NoiseLimit { noise: 1e-6, max_samples: 10 };
+    let (_, counts) = picture(&large(5, Some(limit)));
+    let noisy = counts.noisy_pixels;
+    assert!(noisy > 0 && counts.samples >= 10 * noisy, "{} {noisy}", counts.samples);
     // A limit that nothing reaches, and fewer samples at most than at least
     for max_samples in [64, 2] {
         let limit = NoiseLimit { noise: 10.0, max_samples };

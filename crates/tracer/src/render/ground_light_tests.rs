@@ -149,7 +149,7 @@ fn without_particles_the_floor_is_lit_as_without_photons() {
     scene.lights =
         vec![sun(0.01, Vec3::ONE), Light::directional(Vec3::NEG_Z, Vec3::splat(0.5)).unwrap()];
     let wanted = (scene.environment.as_ref().unwrap().irradiance(Vec3::Z) + 1.5) / PI;
-    let film = image(&Balls(Vec::new()), &scene, Vec3::ONE, &with_photons(1000, 4));
+    let film = image(&Balls(Vec::new()), &scene, Vec3::ONE, &with_photons(1000, 16));
     for pixel in covered(&film) {
         // The paths of the environment are few, and vary
         assert!((pixel / wanted - 1.0).abs().max_element() < 0.05, "{pixel} {wanted}");

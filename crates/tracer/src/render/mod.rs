@@ -178,7 +178,8 @@ pub fn scratch_bytes(
 ) -> u64 {
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
-    let most = settings.last_pass().samples;
+    let passes = settings.passes();
+    let most = passes.last().map_or(settings.samples, |pass| pass.samples);
     // Passes are joined tile by tile
     let pass = match settings.noise {
         None => 0,
@@ -190,7 +191,13 @@ pub fn scratch_bytes(
 
 /// Upper bounds of the memory for the light of photons and on the ground around transmissive particles.
 pub fn ground_light_bytes(scene: &Scene, settings: &RenderSettings) -> GroundLightBytes {
-    path::ground::bytes(scene, &settings.last_pass())
+    let passes = settings.passes();
+    path::ground::bytes(scene, &passes[settings.ground_pass(&passes)])
+}
+
+/// Memory of the sample points of all passes over an image.
+pub fn sampler_bytes(settings: &RenderSettings) -> u64 {
+    settings.passes().iter().map(|pass| FilmSampler::bytes(pass.samples)).sum()
 }
 
 /// Renders one image on the current rayon pool.
@@ -250,8 +257,10 @@ pub fn render_into(
     let passes = settings.passes();
     let contexts =
         passes.iter().map(|pass| RenderContext::new(shapes.clone(), scene, source, pass));
-    let (integrators, before) = integrators_of(contexts.collect(), settings, stop)?;
-    let passes = Passes { integrators, samples: settings.samples, limit: settings.noise };
+    let ground_pass = settings.ground_pass(&passes);
+    let (integrators, before) = integrators_of(contexts.collect(), ground_pass, settings, stop)?;
+    let first = RenderSettings::pass_with(&passes, settings.least_samples());
+    let passes = Passes { integrators, first, samples: settings.samples, limit: settings.noise };
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // Reuse scratch memory: there is one per thread, and all are released at the end of the image
@@ -289,10 +298,11 @@ fn validate_bodies(shapes: &[&dyn Shape], scene: &Scene) -> Result<(), RenderErr
     }
 }
 
-/// The integrators of the settings in `contexts`, with more and more samples, and the rays that were traced to prepare
-/// them.
+/// The integrators of the settings in `contexts`, and the rays that were traced to prepare them. All share the light of
+/// photons, which is that of number `ground_pass`.
 fn integrators_of<'a>(
     mut contexts: Vec<RenderContext<'a>>,
+    ground_pass: usize,
     settings: &RenderSettings,
     stop: &dyn Stop,
 ) -> Result<(Vec<Box<dyn Integrator + 'a>>, RayCounts), RenderError> {
@@ -300,13 +310,11 @@ fn integrators_of<'a>(
         let of = |context| Box::new(WhittedIntegrator::new(context)) as Box<dyn Integrator + 'a>;
         return Ok((contexts.into_iter().map(of).collect(), RayCounts::default()));
     }
-    // All share the light of photons, which is that of the most samples
-    let last = contexts.pop().expect("there is a pass");
-    let (last, traced) =
-        PathIntegrator::new(last).with_photons(stop).ok_or(RenderError::Interrupted)?;
-    let of = |context| Box::new(PathIntegrator::with_light_of(context, &last)) as Box<_>;
+    let own = PathIntegrator::new(contexts.remove(ground_pass));
+    let (own, traced) = own.with_photons(stop).ok_or(RenderError::Interrupted)?;
+    let of = |context| Box::new(PathIntegrator::with_light_of(context, &own)) as Box<_>;
     let mut integrators: Vec<Box<dyn Integrator + 'a>> = contexts.into_iter().map(of).collect();
-    integrators.push(Box::new(last));
+    integrators.insert(ground_pass, Box::new(own));
     Ok((integrators, traced))
 }
 

@@ -67,7 +67,7 @@ pub(super) struct PathIntegrator<'a> {
     split: SplitRule,
     /// Whether rays can hit a light.
     has_extents: bool,
-    catcher: Option<Catcher>,
+    catcher: Option<Arc<Catcher>>,
     /// The light of second surfaces, if paths end there.
     ambient: Option<AmbientLight>,
     /// The light on the ground, if paths end there.
@@ -78,6 +78,11 @@ pub(super) struct PathIntegrator<'a> {
 
 impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
+        let catcher = Catcher::of(context.scene, context.settings).map(Arc::new);
+        Self::with_catcher(context, catcher)
+    }
+
+    fn with_catcher(context: RenderContext<'a>, catcher: Option<Arc<Catcher>>) -> Self {
         let is_connected = context.shapes.connected_particles().is_some();
         // Black environments need no samples
         let given = context.scene.environment.as_deref();
@@ -89,7 +94,7 @@ impl<'a> PathIntegrator<'a> {
             interface: interface_of(context.scene.particle_material(), is_connected),
             interfaces: context.shapes.nested.as_ref().map(BoundaryTable::for_paths),
             split: SplitRule::new(context.settings, context.shapes.interior),
-            catcher: Catcher::of(context.scene, context.settings),
+            catcher,
             ground_light: None,
             caustics: Arc::default(),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
@@ -97,12 +102,12 @@ impl<'a> PathIntegrator<'a> {
         }
     }
 
-    /// Same as [`Self::new`], with the light of photons of `other`.
+    /// Same as [`Self::new`], with the light of photons and the shadow catcher of `other`.
     pub(super) fn with_light_of(context: RenderContext<'a>, other: &Self) -> Self {
         Self {
             ground_light: other.ground_light.clone(),
             caustics: Arc::clone(&other.caustics),
-            ..Self::new(context)
+            ..Self::with_catcher(context, other.catcher.clone())
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Settings of an image, their valid ranges, and the errors for values out of range.
 
+use std::collections::BTreeSet;
+
 use thiserror::Error;
 
 use super::body_set::MAX_TRANSMISSIVE_BODIES;
@@ -55,6 +57,10 @@ pub const MAX_SIDE: u32 = 65_536;
 /// Least number of samples of a pass with a limit of noise: the noise of fewer is not known.
 const MIN_SAMPLES: u32 = 4;
 
+/// With a limit of noise, the light on the ground has the paths of a picture with this many times the least number of
+/// samples. Where more samples are taken, they show what noise it has left.
+const GROUND_LIGHT: u32 = 4;
+
 /// Methods to compute the radiance along rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum IntegratorKind {
@@ -85,6 +91,19 @@ pub struct NoiseLimit {
     pub noise: f32,
     /// Maximum number of samples per pixel.
     pub max_samples: u32,
+}
+
+impl NoiseLimit {
+    /// The number of samples of the first pass over a tile if `samples` are asked for: an even number.
+    pub const fn least_samples(samples: u32) -> u32 {
+        if samples < MIN_SAMPLES { MIN_SAMPLES } else { samples.next_multiple_of(2) }
+    }
+
+    /// The maximum number of samples of a pixel whose first pass has `least`: an even number.
+    pub const fn most_samples(&self, least: u32) -> u32 {
+        let most = self.max_samples / 2 * 2;
+        if most < least { least } else { most }
+    }
 }
 
 /// Settings of an image.
@@ -196,8 +215,7 @@ impl RenderSettings {
     pub const fn least_samples(&self) -> u32 {
         match self.noise {
             None => self.samples,
-            Some(_) if self.samples < MIN_SAMPLES => MIN_SAMPLES,
-            Some(_) => self.samples.next_multiple_of(2),
+            Some(_) => NoiseLimit::least_samples(self.samples),
         }
     }
 
@@ -207,15 +225,28 @@ impl RenderSettings {
             return vec![*self];
         };
         let first = self.least_samples();
-        let most = first.max(limit.max_samples / 2 * 2);
+        // One pass may take all that is left after the first one
+        let left = limit.most_samples(first) - first;
         let more = |samples: &u32| Some((samples + samples / 3).next_multiple_of(2));
-        let fewer = std::iter::successors(Some(first), more).take_while(|samples| *samples < most);
-        fewer.chain([most]).map(|samples| Self { samples, noise: None, ..*self }).collect()
+        let later = std::iter::successors(Some(MIN_SAMPLES), more)
+            .take_while(|samples| *samples < left)
+            .chain(Some(left).filter(|left| *left >= MIN_SAMPLES));
+        let numbers: BTreeSet<u32> = later.chain([first]).collect();
+        numbers.into_iter().map(|samples| Self { samples, noise: None, ..*self }).collect()
     }
 
-    /// The settings of the pass with the most samples.
-    pub(super) fn last_pass(&self) -> Self {
-        self.passes().pop().unwrap_or(*self)
+    /// The first of [`Self::passes`] with `samples` or more, or the last one.
+    pub(super) fn pass_with(passes: &[Self], samples: u32) -> usize {
+        let place = passes.partition_point(|pass| pass.samples < samples);
+        place.min(passes.len() - 1)
+    }
+
+    /// The pass whose light on the ground all passes share, of [`Self::passes`]: most tiles take no more samples.
+    pub(super) fn ground_pass(&self, passes: &[Self]) -> usize {
+        match self.noise {
+            None => 0,
+            Some(_) => Self::pass_with(passes, GROUND_LIGHT * self.least_samples()),
+        }
     }
 
     /// Checks that all settings are in their ranges.

@@ -35,9 +35,9 @@ impl FilmSampler {
         let table = (filter != PixelFilter::BOX && samples > 1).then(|| FilterTable::new(filter));
         let place = |u: f32| table.as_ref().map_or(u, |table| 0.5 + table.position(u));
         let mut sets = MultiJitter::new(samples);
+        let count = set_count(samples);
         let samples = samples.max(1) as usize;
-        let count = (TABLE_POINTS / samples).clamp(MIN_SETS, MAX_SETS);
-        let (mut x, mut y) = (Vec::new(), Vec::new());
+        let [mut x, mut y] = [(); 2].map(|()| Vec::with_capacity(count * samples));
         for set in (u64::from(seed) << 32..).take(count) {
             sets.for_each(set, |point| {
                 x.push(place(point.x));
@@ -45,6 +45,11 @@ impl FilmSampler {
             });
         }
         Self { samples, x, y }
+    }
+
+    /// Memory of the points of a sampler with `samples` points per pixel.
+    pub(in crate::render) fn bytes(samples: u32) -> u64 {
+        (set_count(samples) * samples.max(1) as usize * size_of::<[f32; 2]>()) as u64
     }
 
     /// The points of pixel `(x, y)`, with coordinates in 0..1, or around that with a filter that is wider than the
@@ -71,6 +76,11 @@ impl FilmSampler {
     pub fn all_points(&self) -> impl Iterator<Item = [f32; 2]> {
         self.x.iter().zip(&self.y).map(|(x, y)| [*x, *y])
     }
+}
+
+/// Number of sets of `samples` points in a table.
+fn set_count(samples: u32) -> usize {
+    (TABLE_POINTS / samples.max(1) as usize).clamp(MIN_SETS, MAX_SETS)
 }
 
 #[cfg(test)]

@@ -23,15 +23,16 @@ use spherule_tree::ray::Ray;
 /// Texels along an edge of the map.
 const SIDE: usize = 128;
 
-/// Paths of each texel in images with up to [`FEW_SAMPLES`] samples. More samples have more paths, up to
-/// [`MAX_PATHS`]: with a small light in the environment, fewer leave blotches that no number of samples removes.
-const MIN_PATHS: usize = 64;
-const MAX_PATHS: usize = 8 * MIN_PATHS;
-const FEW_SAMPLES: usize = 16;
+/// Paths of each texel for each sample of a pixel: with a small light in the environment, fewer leave blotches that no
+/// number of samples removes.
+const PATHS_OF_SAMPLE: usize = 4;
+const MIN_PATHS: usize = 16;
+const MAX_PATHS: usize = 512;
 
-/// Paths of each texel.
+/// Paths of each texel, in steps of [`MIN_PATHS`].
 fn path_count(settings: &RenderSettings) -> usize {
-    (MIN_PATHS * (settings.samples as usize / FEW_SAMPLES)).clamp(MIN_PATHS, MAX_PATHS)
+    let paths = PATHS_OF_SAMPLE * settings.samples as usize;
+    paths.next_multiple_of(MIN_PATHS).min(MAX_PATHS)
 }
 
 /// Height above the ground from which rays find it, as a fraction of the edge of the map.
