@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::native;
 use crate::read::{
-    amber, bgeo, bi4, charmm_crd, csv, dcd, dl_poly, gadget, gro, gromos, gsd, houdini, lammps,
-    las, mdcrd, mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, tipsy, trr, usd, vasp,
-    vtk, vtk_xml, xtc, xyz,
+    amber, bgeo, bi4, charmm_crd, csv, dcd, dl_poly, e57, gadget, gro, gromos, gsd, houdini,
+    lammps, las, mdcrd, mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, tipsy, trr, usd,
+    vasp, vtk, vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -22,6 +22,7 @@ const FORMATS: &[Format] = &[
     pcd::FORMAT,
     pts::FORMAT,
     las::FORMAT,
+    e57::FORMAT,
     xyz::FORMAT,
     lammps::FORMAT,
     lammps::BINARY,

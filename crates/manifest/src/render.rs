@@ -4,9 +4,9 @@ use glam::Vec3;
 use spherule_files::Bytes;
 use spherule_images::overlay::Layout;
 use spherule_tracer::render::{
-    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind,
-    IntegratorKind, MAX_BOUNCES, MAX_CLAMP, MAX_DEPTH, MAX_FILTER_WIDTH, MAX_NOISE, MAX_SAMPLES,
-    MAX_SEED, MAX_SIDE, MIN_WEIGHTS, RendererKind,
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
+    MAX_CLAMP, MAX_DEPTH, MAX_FILTER_WIDTH, MAX_NOISE, MAX_SAMPLES, MAX_SEED, MAX_SIDE,
+    MIN_WEIGHTS, RendererKind,
 };
 use spherule_tracer::scene::{Background, ground};
 use spherule_tree::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};

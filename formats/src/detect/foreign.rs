@@ -45,10 +45,6 @@ const MAGICS: &[(&[u8], &str)] = &[
     (b"SQLite format 3", "an SQLite database, which is not read; write the particles as .csv"),
     (b"BLENDER", "a Blender file, which is not read; export the points as .ply"),
     (b"Kaydara FBX", "an FBX file, which is not read; export the points as .ply"),
-    (
-        b"ASTM-E57",
-        "an E57 point cloud, which is not read; write .ply or .las with PDAL or CloudCompare (`pdal translate in.e57 out.las`)",
-    ),
     (b"glTF", "a glTF file, which is not read; export the points as .ply"),
     (b"\xff\xfe", UTF16),
     (b"\xfe\xff", UTF16),

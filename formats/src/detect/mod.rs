@@ -226,7 +226,6 @@ mod tests {
         refused("a.webp", b"RIFF\0\0\0\0WEBP", "image");
         refused("a.xmf", b"<?xml version=\"1.0\"?>\n<Xdmf>", "XDMF");
         refused("a.abc", b"Ogawa\0", "Alembic");
-        refused("a.e57", b"ASTM-E57\x01\0\0\0", "pdal translate in.e57");
         refused("a.bgeo.sc", b"scf1", "blosc inside");
         refused("a.geo", b"PGEOMETRY V5\n", "bgeo");
         refused("a.pdb", b"\x9e\x02\0\0\x01\0", "PDB");

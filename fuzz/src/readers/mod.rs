@@ -23,13 +23,14 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 46] = [
+pub const TARGETS: [(&str, Target); 47] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
     ("houdini", houdini),
     ("ply", ply),
     ("las", las),
+    ("e57", e57),
     ("pts", pts),
     ("pcd", pcd),
     ("xyz", xyz),
@@ -116,6 +117,18 @@ pub fn ply(bytes: &[u8]) -> usize {
 pub fn las(bytes: &[u8]) -> usize {
     let is_compressed = bytes.get(104).is_some_and(|format| format & 0x80 != 0);
     read_all(read::las::FORMAT, bytes, if is_compressed { LAZ_RATIO } else { 1 })
+}
+
+/// The content of E57, which is divided into pages with checksums here: the reader refuses pages that are damaged.
+pub fn e57(bytes: &[u8]) -> usize {
+    let mut content = bytes.to_vec();
+    content.resize(bytes.len().next_multiple_of(1020), 0);
+    let bit = |sum: u32| (sum >> 1) ^ if sum & 1 == 1 { 0x82f6_3b78 } else { 0 };
+    let byte = |sum: u32, byte: &u8| (0..8).fold(sum ^ u32::from(*byte), |sum, _| bit(sum));
+    let seal = |page: &[u8]| [page, &(!page.iter().fold(u32::MAX, byte)).to_be_bytes()].concat();
+    let pages: Vec<u8> = content.chunks(1020).flat_map(seal).collect();
+    // Points of one bit, with fields of none
+    read_all(read::e57::FORMAT, &pages, 8 * 32)
 }
 
 /// Point clouds of laser scanners in text.

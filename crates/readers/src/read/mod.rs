@@ -19,6 +19,7 @@ pub mod csv;
 mod damage;
 pub mod dcd;
 pub mod dl_poly;
+pub mod e57;
 mod fixed_rows;
 pub mod gadget;
 pub mod gro;

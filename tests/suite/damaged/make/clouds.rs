@@ -1,4 +1,4 @@
-//! Point clouds, snapshots and geometry that are broken: LAS, LAZ, PCD, GADGET, text of Houdini.
+//! Point clouds, snapshots and geometry that are broken: LAS, LAZ, E57, PCD, GADGET, text of Houdini.
 
 use super::base::{Base, find};
 use super::{Made, NAN, WHOLE, little};
@@ -41,6 +41,11 @@ pub(super) fn las() -> Vec<Made> {
         .made
 }
 
+/// A damaged file that is not made here.
+fn kept(name: &str) -> Vec<u8> {
+    std::fs::read(crate::damaged::directory().join(name)).expect("a damaged file")
+}
+
 /// Streams of points (format 2), and chunks with layers (format 6).
 pub(super) fn laz() -> Vec<Made> {
     let bytes = |format: u8| {
@@ -56,7 +61,8 @@ pub(super) fn laz() -> Vec<Made> {
         .replace("no-record", "laszip encoded", "laszip missing")
         .patch("compressor", stream_record, &[9, 0])
         .patch("other-compressor", stream_record, &[3, 0])
-        .patch("times", 104, &[0x83, 34, 0])
+        // Found by mutation
+        .file("times", kept("stream-times.laz"))
         .patch("variable-chunks", stream_record + 12, &[0xff; 4])
         .patch("item", stream_record + 34, &[77, 0])
         .patch("other-items", stream_record + 34, &[7, 0])
@@ -76,6 +82,84 @@ pub(super) fn laz() -> Vec<Made> {
             .made,
     );
     made
+}
+
+/// Bytes of a page of E57 without the checksum behind them.
+const PAGE: usize = 1020;
+
+/// The content of an E57 file of a scan with one packet, before it is divided into pages.
+fn e57_content(points: &[[f32; 3]]) -> Vec<u8> {
+    let each = u16::try_from(4 * points.len()).expect("a few points");
+    let axis = |axis: usize| points.iter().flat_map(move |point| point[axis].to_le_bytes());
+    let mut packet = [3, each, each, each].map(u16::to_le_bytes).concat();
+    packet.extend((0..3).flat_map(axis));
+    let len = u16::try_from(4 + packet.len() - 1).expect("short").to_le_bytes();
+    let section = [1_u64, 32 + 4 + packet.len() as u64, 80, 0].map(u64::to_le_bytes).concat();
+    let body = [&section, &[1, 0][..], &len, &packet].concat();
+    let field = |axis| format!("<cartesian{axis} type=\"Float\" precision=\"single\"/>");
+    let xml = format!(
+        "<e57Root><data3D><vectorChild><points fileOffset=\"48\" recordCount=\"{}\"><prototype>{}</prototype></points>\
+         </vectorChild></data3D></e57Root>",
+        points.len(),
+        ["X", "Y", "Z"].map(field).concat()
+    );
+    let mut file = b"ASTM-E57\x01\0\0\0\0\0\0\0".to_vec();
+    let lengths = [1024, 48 + body.len() as u64, xml.len() as u64, 1024];
+    file.extend(lengths.map(u64::to_le_bytes).concat());
+    file.extend(body);
+    file.extend(xml.bytes());
+    file
+}
+
+/// `content` in pages with checksums (CRC-32C).
+fn e57_pages(mut content: Vec<u8>) -> Vec<u8> {
+    content.resize(content.len().next_multiple_of(PAGE), 0);
+    let bit = |sum: u32| (sum >> 1) ^ if sum & 1 == 1 { 0x82f6_3b78 } else { 0 };
+    let byte = |sum: u32, byte: &u8| (0..8).fold(sum ^ u32::from(*byte), |sum, _| bit(sum));
+    let seal = |page: &[u8]| [page, &(!page.iter().fold(u32::MAX, byte)).to_be_bytes()].concat();
+    content.chunks(PAGE).flat_map(seal).collect()
+}
+
+pub(super) fn e57() -> Vec<Made> {
+    let content = e57_content(&WHOLE);
+    let text = |old: &str, new: &str| {
+        let mut changed = super::base::replace(&content, old.as_bytes(), new.as_bytes());
+        let len = changed.len() - find(&changed, b"<e57Root");
+        changed[32..40].copy_from_slice(&(len as u64).to_le_bytes());
+        e57_pages(changed)
+    };
+    let bytes = |at: usize, new: &[u8]| {
+        let mut changed = content.clone();
+        changed[at..at + new.len()].copy_from_slice(new);
+        e57_pages(changed)
+    };
+    let xml = String::from_utf8(content[find(&content, b"<e57Root")..].to_vec()).expect("text");
+    let single = "<cartesianX type=\"Float\" precision=\"single\"/>";
+    Base::new("scan", "e57", e57_pages(content.clone()))
+        .replace("magic", "ASTM-E57", "ASTM-E75")
+        .cut_at("cut-in-head", 40)
+        .cut_at("cut-in-page", 900)
+        .patch("checksum", 100, &[9])
+        .file("version", bytes(8, &[2]))
+        .file("page-size", bytes(40, &[9, 0]))
+        .file("far-xml", bytes(24, &[0xff; 4]))
+        .file("absurd-xml", bytes(32, &[0xff; 8]))
+        .file("section", bytes(48, &[7]))
+        .file("far-packet", bytes(64, &[0xff; 8]))
+        .file("packet", bytes(80, &[7]))
+        .file("short-packet", bytes(82, &[7, 0]))
+        .file("fields-of-packet", bytes(84, &[2, 0]))
+        .file("absurd-points", text("recordCount=\"3\"", "recordCount=\"4000000000\""))
+        .file("more-points", text("recordCount=\"3\"", "recordCount=\"4\""))
+        .file("no-x", text("cartesianX", "cartesianW"))
+        .file("two-x", text("cartesianY", "cartesianX"))
+        .file("type", text("type=\"Float\"", "type=\"String\""))
+        .file("xml", text("</prototype>", "</points>"))
+        .file("range", text(single, "<cartesianX type=\"Integer\" minimum=\"9\" maximum=\"8\"/>"))
+        .file("no-scans", text(&xml, "<e57Root/>"))
+        .file("nan", e57_pages(e57_content(&NAN)))
+        .file("zero", e57_pages(e57_content(&[])))
+        .made
 }
 
 fn pcd_bytes(points: &[[f32; 3]]) -> Vec<u8> {

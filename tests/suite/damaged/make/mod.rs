@@ -15,7 +15,7 @@ mod gsd;
 mod text;
 
 use base::{Base, find, replace};
-use clouds::{gadget, geo, las, laz, pcd};
+use clouds::{e57, gadget, geo, las, laz, pcd};
 use gsd::gsd;
 use text::{csv, lammps, rst7, vtk_ascii, xyz};
 
@@ -32,7 +32,7 @@ pub(super) fn files() -> Vec<Made> {
     let mut all = vec![("empty.vtk".to_owned(), Vec::new())];
     for kind in [
         vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd, las, laz,
-        pcd, gadget, geo,
+        e57, pcd, gadget, geo,
     ] {
         all.extend(kind());
     }
