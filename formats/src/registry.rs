@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::native;
 use crate::read::{
     amber, bgeo, bi4, charmm_crd, csv, dcd, dl_poly, e57, gadget, gro, gromos, gsd, houdini,
-    lammps, las, mdcrd, mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, tipsy, trr, usd,
-    vasp, vtk, vtk_xml, xtc, xyz,
+    lammps, las, mdcrd, mmcif, mol2, npy, openpmd_json, pcd, pdb, ply, pts, rst7, sdf, tinker,
+    tipsy, trr, usd, vasp, vtk, vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -51,6 +51,7 @@ const FORMATS: &[Format] = &[
     pdb::FORMAT,
     mmcif::FORMAT,
     usd::FORMAT,
+    openpmd_json::FORMAT,
     #[cfg(feature = "hdf5")]
     crate::hdf5::FORMAT,
     // Behind formats with longer signatures

@@ -362,3 +362,23 @@ fn objects_with_several_names_count_once() {
         assert!(!has_parts || name == "alias_pysph.h5", "{name}");
     }
 }
+
+#[test]
+fn openpmd_in_json_is_that_in_hdf5() {
+    let open = |name: &str| {
+        let path = format!("{}/../tests/data/openpmd/{name}", env!("CARGO_MANIFEST_DIR"));
+        FrameFile::open(path.as_ref()).expect("a sample")
+    };
+    let (json, hdf5) = (open("species.json"), open("species.h5.gz"));
+    assert_eq!((json.format().name(), json.steps().len()), ("openpmd-json", 2));
+    for index in 0..2 {
+        let [mut one, mut other] = [&json, &hdf5].map(|file| file.read(index).expect("particles"));
+        for particles in [&mut one, &mut other] {
+            particles.attributes.sort_by(|a, b| a.name.cmp(&b.name));
+        }
+        // Numbers that are missing are NaN
+        assert_eq!(format!("{one:?}"), format!("{other:?}"));
+        assert_eq!(one.positions.len(), 8);
+    }
+    assert_eq!(json.steps()[1].number, Some(100));
+}

@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 47] = [
+pub const TARGETS: [(&str, Target); 48] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -31,6 +31,7 @@ pub const TARGETS: [(&str, Target); 47] = [
     ("ply", ply),
     ("las", las),
     ("e57", e57),
+    ("openpmd_json", openpmd_json),
     ("pts", pts),
     ("pcd", pcd),
     ("xyz", xyz),
@@ -129,6 +130,12 @@ pub fn e57(bytes: &[u8]) -> usize {
     let pages: Vec<u8> = content.chunks(1020).flat_map(seal).collect();
     // Points of one bit, with fields of none
     read_all(read::e57::FORMAT, &pages, 8 * 32)
+}
+
+/// openPMD in JSON.
+pub fn openpmd_json(bytes: &[u8]) -> usize {
+    // A number, and those of records of one value
+    read_all(read::openpmd_json::FORMAT, bytes, 3 * 64)
 }
 
 /// Point clouds of laser scanners in text.

@@ -39,6 +39,7 @@ mod molecule_tests;
 pub mod notes;
 pub mod npy;
 mod numbers;
+pub mod openpmd_json;
 pub mod pcd;
 pub mod pdb;
 #[cfg(test)]

@@ -17,7 +17,7 @@ mod text;
 use base::{Base, find, replace};
 use clouds::{e57, gadget, geo, las, laz, pcd};
 use gsd::gsd;
-use text::{csv, lammps, rst7, vtk_ascii, xyz};
+use text::{csv, lammps, openpmd, rst7, vtk_ascii, xyz};
 
 /// Name and content.
 pub(super) type Made = (String, Vec<u8>);
@@ -32,7 +32,7 @@ pub(super) fn files() -> Vec<Made> {
     let mut all = vec![("empty.vtk".to_owned(), Vec::new())];
     for kind in [
         vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd, las, laz,
-        e57, pcd, gadget, geo,
+        e57, openpmd, pcd, gadget, geo,
     ] {
         all.extend(kind());
     }

@@ -96,3 +96,47 @@ fn text(points: &[[f32; 3]]) -> String {
     let line = |p: &[f32; 3]| format!("{} {} {}\n", p[0], p[1], p[2]);
     points.iter().map(line).collect()
 }
+
+/// openPMD in JSON: an iteration with one species.
+fn openpmd_text(points: &[[f32; 3]]) -> Vec<u8> {
+    let values = |axis: usize| -> Vec<String> {
+        points
+            .iter()
+            .map(|p| if p[axis].is_nan() { "null".into() } else { format!("{:?}", p[axis]) })
+            .collect()
+    };
+    let component = |(axis, name)| {
+        format!(
+            "\"{name}\":{{\"attributes\":{{}},\"data\":[{}],\"datatype\":\"FLOAT\"}}",
+            values(axis).join(",")
+        )
+    };
+    let axes: Vec<String> = (0..).zip(["x", "y", "z"]).map(component).collect();
+    format!(
+        "{{\"attributes\":{{\"openPMD\":{{\"datatype\":\"STRING\",\"value\":\"1.1.0\"}}}},\"data\":{{\"7\":{{\"attributes\":\
+         {{\"time\":{{\"datatype\":\"DOUBLE\",\"value\":0.5}}}},\"particles\":{{\"e\":{{\"position\":{{{}}}}}}}}}}}}}",
+        axes.join(",")
+    )
+    .into_bytes()
+}
+
+pub(super) fn openpmd() -> Vec<Made> {
+    Base::new("plasma", "json", openpmd_text(&WHOLE))
+        .replace("magic", "openPMD", "openPMC")
+        .cut("cut-in-attributes", "\"value\":", 2)
+        .cut("cut-in-values", "\"data\":[", 5)
+        .replace("not-utf8", "\"time\"", b"\"tim\xff\"")
+        .replace("no-particles", "particles", "meshes")
+        .replace("no-position", "\"position\"", "\"place\"")
+        .replace("no-axes", "\"x\":", "\"a\":")
+        .replace("one-axis", "\"y\":", "\"z\":")
+        .replace("more-values", "\"data\":[", "\"data\":[4.5,")
+        .replace("text", "\"data\":[", "\"data\":[\"a\",")
+        .replace("rows", "\"data\":[0.0", "\"data\":[[0.0]")
+        .replace("type", "FLOAT", "CDOUBLE")
+        .replace("no-type", "\"FLOAT\"", "3")
+        .replace("time", "0.5", "\"late\"")
+        .file("nan", openpmd_text(&NAN))
+        .file("zero", openpmd_text(&[]))
+        .made
+}

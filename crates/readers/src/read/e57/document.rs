@@ -13,6 +13,7 @@ pub(super) struct Scan {
     /// Place in the file of its points.
     pub(super) place: usize,
     pub(super) count: usize,
+    pub(super) name: String,
     /// What each point has.
     pub(super) fields: Vec<Field>,
     pose: Pose,
@@ -88,10 +89,14 @@ impl Scan {
         self.fields.iter().position(|field| field.name == name)
     }
 
-    /// The number of the pose that the element at `path` below the scan is.
-    fn number(&mut self, path: &str) -> Option<&mut f64> {
+    /// Adds the text of the element at `path` below the scan: its name, or a number of the pose.
+    fn add_text(&mut self, path: &str, text: &str, at: usize) -> Result<(), ParseError> {
         let Pose { rotation, translation } = &mut self.pose;
-        Some(match path {
+        let number = match path {
+            "/name" => {
+                self.name = short(text);
+                return Ok(());
+            }
             "/pose/rotation/w" => &mut rotation.w,
             "/pose/rotation/x" => &mut rotation.x,
             "/pose/rotation/y" => &mut rotation.y,
@@ -99,8 +104,10 @@ impl Scan {
             "/pose/translation/x" => &mut translation.x,
             "/pose/translation/y" => &mut translation.y,
             "/pose/translation/z" => &mut translation.z,
-            _ => return None,
-        })
+            _ => return Ok(()),
+        };
+        *number = parsed(text, at)?;
+        Ok(())
     }
 }
 
@@ -123,13 +130,8 @@ pub(super) fn scans(xml: &str, start: usize) -> Result<Vec<Scan>, ParseError> {
                 close(&mut path);
             }
             Ok(Event::End(_)) => close(&mut path),
-            Ok(Event::Text(text)) => {
-                let inside = path.strip_prefix(SCAN);
-                let scan = scans.last_mut();
-                if let Some(number) = scan.zip(inside).and_then(|(scan, path)| scan.number(path)) {
-                    *number = parsed(text.trim_ascii(), at)?;
-                }
-            }
+            Ok(Event::Text(text)) => add_text(&mut scans, &path, &text, at)?,
+            Ok(Event::CData(text)) => add_text(&mut scans, &path, &text, at)?,
             Ok(Event::Eof) => break,
             Ok(_) => {}
             Err(error) => return Err(ParseError::malformed(at, format!("bad XML: {error}"))),
@@ -144,6 +146,14 @@ pub(super) fn scans(xml: &str, start: usize) -> Result<Vec<Scan>, ParseError> {
         }
     }
     Ok(scans)
+}
+
+/// Adds the text of the element at `path`.
+fn add_text(scans: &mut [Scan], path: &str, text: &str, at: usize) -> Result<(), ParseError> {
+    match (scans.last_mut(), path.strip_prefix(SCAN)) {
+        (Some(scan), Some(inside)) => scan.add_text(inside, text.trim_ascii(), at),
+        _ => Ok(()),
+    }
 }
 
 /// Adds what the element that begins says, and its name to `path`.

@@ -7,7 +7,9 @@ use glam::DVec3;
 
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, FileExtent, FormatInfo, Reader};
+use crate::reader::{Confidence, FileExtent, FormatInfo, Reader, ValueNames};
+use crate::shared::SharedBytes;
+use spherule_frame::join::{PART, Part, join_numbered};
 use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
 
 mod document;
@@ -39,9 +41,6 @@ const NAMES: [(&str, &str); 8] = [
     ("isIntensityInvalid", "is_intensity_invalid"),
     ("isTimeStampInvalid", "is_time_stamp_invalid"),
 ];
-/// The number of the scan of a point, if a file has several.
-const SCAN: &str = "scan";
-
 impl Reader for E57 {
     fn info(&self) -> FormatInfo {
         FormatInfo { notes_need_whole_file: true, ..FormatInfo::new("e57", &["e57"]) }
@@ -55,41 +54,28 @@ impl Reader for E57 {
         Ok(vec![Step::whole(source.bytes().len())])
     }
 
-    /// Reads the points of all scans, with the numbers that all scans have. Points that the scanner could not place have no
-    /// position.
+    /// Reads the points of all scans. Points that the scanner could not place have no position.
     fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
         let budget = source.budget();
         let (pages, scans) = open(source.bytes(), budget)?;
-        let names = common_names(&scans);
         points::check_counts(&scans, pages.len())?;
-        // Check the memory for the numbers before and after they are put together
-        let count: usize = scans.iter().map(|scan| scan.count).fold(0, usize::saturating_add);
-        let most = scans.iter().map(|scan| scan.fields.len()).max().unwrap_or(0);
-        let each = size_of::<DVec3>() + (2 * most + 1) * size_of::<f64>();
-        let need = (each as u64).saturating_mul(count as u64);
+        // Check the memory for the numbers in double precision and in their types
+        let need = |scan: &Scan| {
+            let each = size_of::<DVec3>() + 2 * scan.fields.len() * size_of::<f64>();
+            (each as u64).saturating_mul(scan.count as u64)
+        };
+        let need = scans.iter().map(need).fold(0, u64::saturating_add);
         budget.check(need, "its numbers in memory are")?;
-        // Put the scans together
-        let (mut positions, mut columns) =
-            (Vec::with_capacity(count), vec![Vec::new(); names.len()]);
-        for scan in &scans {
-            let mut values = points::values(&pages, scan)?;
-            positions.extend(places(scan, &values)?);
-            for (column, name) in columns.iter_mut().zip(&names) {
-                if let Some(field) = scan.field(name) {
-                    column.append(&mut values[field]);
-                }
-            }
+        // Read the scans, and put them together
+        let mut parts = Vec::new();
+        for (number, scan) in (0..).zip(&scans) {
+            let particles = particles(scan, &points::values(&pages, scan)?)?;
+            parts.push(Part { number, name: name_of(number, scan), particles });
         }
-        let is_single = scans.iter().all(has_single_positions);
-        Ok(RawParticles {
-            positions: if is_single {
-                Positions::F32(positions.iter().map(|place| place.as_vec3()).collect())
-            } else {
-                Positions::F64(positions)
-            },
-            attributes: attributes(&scans, &names, columns),
-            ..RawParticles::default()
-        })
+        match parts.len() {
+            1 => Ok(parts.remove(0).particles),
+            _ => join_numbered(parts, budget.less(need)),
+        }
     }
 
     /// The numbers in double precision.
@@ -98,25 +84,27 @@ impl Reader for E57 {
         ((3 + numbers) * size_of::<f64>() * particles.positions.len()) as u64
     }
 
-    fn notes(&self, bytes: &[u8]) -> Vec<String> {
-        let Ok((_, scans)) = open(bytes, MemoryBudget::UNLIMITED) else {
+    fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
+        let Ok((_, scans)) = open(file, MemoryBudget::UNLIMITED) else { return Vec::new() };
+        if scans.len() == 1 {
             return Vec::new();
-        };
-        let mut notes = Vec::new();
-        if scans.len() > 1 {
-            notes.push(format!("{} scans; `{SCAN}` is the number of the scan", scans.len()));
         }
-        let names = common_names(&scans);
-        let all = scans.iter().flat_map(|scan| &scan.fields).map(|field| field.name.as_str());
-        let mut missing: Vec<&str> =
-            all.filter(|name| !is_place(name) && !names.contains(name)).collect();
-        missing.sort_unstable();
-        missing.dedup();
-        if !missing.is_empty() {
-            notes.push(format!("not in all scans, and left out: {}", missing.join(", ")));
-        }
-        notes
+        let numbered = (0..).zip(&scans);
+        let names = numbered.map(|(number, scan)| (number.into(), name_of(number, scan)));
+        vec![ValueNames { attribute: PART.to_owned(), names: names.collect() }]
     }
+
+    fn notes(&self, bytes: &[u8]) -> Vec<String> {
+        let scans = open(bytes, MemoryBudget::UNLIMITED).map(|(_, scans)| scans);
+        let several = scans.ok().filter(|scans| scans.len() > 1);
+        let note = |scans: Vec<Scan>| format!("{} scans; `{PART}` is their number", scans.len());
+        several.map(note).into_iter().collect()
+    }
+}
+
+/// The name of a scan.
+fn name_of(number: u32, scan: &Scan) -> String {
+    if scan.name.is_empty() { format!("scan{number}") } else { scan.name.clone() }
 }
 
 /// The pages and the scans of a file.
@@ -135,16 +123,35 @@ fn open(bytes: &[u8], budget: MemoryBudget) -> Result<(Pages<'_>, Vec<Scan>), Pa
     Ok((pages, scans))
 }
 
-/// Whether a field is part of the position.
-fn is_place(name: &str) -> bool {
-    CARTESIAN.contains(&name) || SPHERICAL.contains(&name) || INVALID.contains(&name)
-}
-
-/// The fields beside the position that all scans have, in the order of the first one.
-fn common_names(scans: &[Scan]) -> Vec<&str> {
-    let first = scans.iter().take(1).flat_map(|scan| &scan.fields);
-    let names = first.map(|field| field.name.as_str()).filter(|name| !is_place(name));
-    names.filter(|name| scans.iter().all(|scan| scan.field(name).is_some())).collect()
+/// The particles of the points of `scan` with these `values` of its fields.
+fn particles(scan: &Scan, values: &[Vec<f64>]) -> Result<RawParticles, ParseError> {
+    let places = places(scan, values)?;
+    let positions = if has_single_positions(scan) {
+        Positions::F32(places.iter().map(|place| place.as_vec3()).collect())
+    } else {
+        Positions::F64(places)
+    };
+    let color = fields_of(scan, COLOR);
+    let mut attributes = Vec::new();
+    if let Some([red, green, blue]) = color {
+        let colors = values[red].iter().zip(&values[green]).zip(&values[blue]);
+        let values: Vec<f64> = colors.flat_map(|((r, g), b)| [*r, *g, *b]).collect();
+        let kinds = [red, green, blue].map(|field| scan.fields[field].kind);
+        let data = typed(&kinds, &values);
+        attributes.push(Attribute { name: "color".into(), components: 3, data });
+    }
+    for (field, values) in scan.fields.iter().zip(values) {
+        let name = field.name.as_str();
+        let is_place = [&CARTESIAN[..], &SPHERICAL, &INVALID].concat().contains(&name);
+        if is_place || color.is_some() && COLOR.contains(&name) {
+            continue;
+        }
+        let known = NAMES.iter().find(|(in_file, _)| *in_file == name);
+        let shown = known.map_or(name, |(_, shown)| shown);
+        let data = typed(&[field.kind], values);
+        attributes.push(Attribute { name: shown.to_owned(), components: 1, data });
+    }
+    Ok(RawParticles { positions, attributes, ..RawParticles::default() })
 }
 
 /// The places of three fields.
@@ -184,40 +191,6 @@ fn places(scan: &Scan, values: &[Vec<f64>]) -> Result<Vec<DVec3>, ParseError> {
     let placed = scan.placed();
     let place = |point: usize| if is_valid(point) { placed(local(point)) } else { DVec3::NAN };
     Ok((0..scan.count).map(place).collect())
-}
-
-/// The attributes of the `columns` of these names.
-fn attributes(scans: &[Scan], names: &[&str], mut columns: Vec<Vec<f64>>) -> Vec<Attribute> {
-    let kinds = |name: &str| -> Vec<FieldKind> {
-        scans.iter().filter_map(|scan| Some(scan.fields[scan.field(name)?].kind)).collect()
-    };
-    let mut found = Vec::new();
-    // Put the colours together
-    let of_color = COLOR.map(|name| names.iter().position(|found| *found == name));
-    if let [Some(red), Some(green), Some(blue)] = of_color {
-        let [red, green, blue] = [red, green, blue].map(|at| std::mem::take(&mut columns[at]));
-        let colors = red.iter().zip(&green).zip(&blue);
-        let values: Vec<f64> = colors.flat_map(|((r, g), b)| [*r, *g, *b]).collect();
-        let kinds: Vec<_> = COLOR.into_iter().flat_map(kinds).collect();
-        found.push(Attribute { name: "color".into(), components: 3, data: typed(&kinds, &values) });
-    }
-    for (name, values) in names.iter().zip(columns) {
-        if COLOR.contains(name) && values.is_empty() {
-            continue;
-        }
-        let known = NAMES.iter().find(|(in_file, _)| in_file == name);
-        let shown = known.map_or(*name, |(_, shown)| shown);
-        let data = typed(&kinds(name), &values);
-        found.push(Attribute { name: shown.to_owned(), components: 1, data });
-    }
-    // Number the scans
-    if scans.len() > 1 {
-        let numbers = scans.iter().zip(0_u32..);
-        let all = numbers.flat_map(|(scan, number)| std::iter::repeat_n(number, scan.count));
-        let data = AttributeData::U32(all.collect());
-        found.push(Attribute { name: SCAN.into(), components: 1, data });
-    }
-    found
 }
 
 /// `values` in the smallest type that has all values of these kinds.
@@ -280,12 +253,12 @@ mod tests {
             assert_eq!(colors[3 * point..][..3], row[3..6]);
             assert_eq!(numbers(&attribute(&found, "row_index").data)[point], row[6]);
         }
-        let expected = ["color", "intensity", "row_index", "column_index", "scan"];
+        let expected = ["color", "intensity", "row_index", "column_index", "part"];
         assert_eq!(names(&found), expected);
         assert!(matches!(attribute(&found, "color").data, AttributeData::U8(_)));
-        let scan = numbers(&attribute(&found, "scan").data);
+        let scan = numbers(&attribute(&found, "part").data);
         assert_eq!((scan[59], scan[60]), (0.0, 1.0));
-        assert_eq!(FORMAT.reader().notes(&bytes), ["2 scans; `scan` is the number of the scan"]);
+        assert_eq!(FORMAT.reader().notes(&bytes), ["2 scans; `part` is their number"]);
     }
 
     #[test]
