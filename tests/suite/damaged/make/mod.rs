@@ -12,11 +12,13 @@ use zip::write::{SimpleFileOptions, ZipWriter};
 mod base;
 mod clouds;
 mod gsd;
+mod molecules;
 mod text;
 
 use base::{Base, find, replace};
 use clouds::{e57, gadget, geo, las, laz, pcd};
 use gsd::gsd;
+use molecules::molecules;
 use text::{csv, lammps, openpmd, rst7, vtk_ascii, xyz};
 
 /// Name and content.
@@ -32,7 +34,7 @@ pub(super) fn files() -> Vec<Made> {
     let mut all = vec![("empty.vtk".to_owned(), Vec::new())];
     for kind in [
         vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd, las, laz,
-        e57, openpmd, pcd, gadget, geo,
+        e57, openpmd, pcd, gadget, geo, molecules,
     ] {
         all.extend(kind());
     }
