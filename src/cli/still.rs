@@ -179,7 +179,8 @@ fn report(
     start: Instant,
 ) -> Result<Outcome, CliError> {
     match rendered {
-        Ok(report) => {
+        Ok(mut report) => {
+            report.seconds.wall = start.elapsed().as_secs_f64();
             for text in sampling_notes(&report) {
                 note!("{text}");
             }
@@ -193,8 +194,7 @@ fn report(
             if !events::are_sent() {
                 print::lines([format!(
                     "{image}: frame {frame}, {} particles, {:.2} s",
-                    report.particles,
-                    start.elapsed().as_secs_f64()
+                    report.particles, report.seconds.wall
                 )])?;
             }
             Ok(Outcome::Done)

@@ -186,7 +186,6 @@ impl EncodeStage<'_> {
     ) {
         for AtEncoder { place, encoder, frame: StagedFrame { claimed, result } } in traced {
             let result = result.map_err(NotEncoded::Failed).and_then(|frame| {
-                self.context.report_stage(claimed.frame, "writing");
                 if !claimed.is_held() {
                     return Err(NotEncoded::NotHeld);
                 }
@@ -207,8 +206,10 @@ impl EncodeStage<'_> {
         }
         let write = || {
             if self.setup.denoises_when_encoding() {
+                self.context.report_stage(number, "denoising");
                 in_pool(|| frame.denoise(self.setup)).map_err(TraceError::from)?;
             }
+            self.context.report_stage(number, "writing");
             Ok(write_frame(self.setup, frame, self.peaks)?)
         };
         let (report, film) =

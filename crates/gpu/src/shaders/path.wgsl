@@ -205,6 +205,11 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces, BOUNCED); }
   // A catcher shows its shadows only
   let is_caught = is_first && is_ground && scene.is_catcher == 1u;
+  // Before the light: behind it, the compiler of an NVIDIA driver (580.159) loses the light of spheres
+  if (is_ray) {
+    let of_ground = object_of_ground(select(1.0, ground.opacity, view.transparent == 1u));
+    keep_object(path.pixel, select(select(MISS, of_ground, is_ground && !is_caught), hit.index, is_sphere));
+  }
   // What is behind all surfaces, and behind a ground that fades out
   let uncovered = select(1.0, 1.0 - ground.opacity, is_ground && !is_caught);
   if (is_open && !is_sphere && uncovered > 0.0) {
@@ -305,8 +310,6 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   }
   if (is_ray) {
     add_light(path.pixel, sum, direct);
-    let of_ground = object_of_ground(select(1.0, ground.opacity, view.transparent == 1u));
-    keep_object(path.pixel, select(select(MISS, of_ground, is_ground && !is_caught), hit.index, is_sphere));
   }
 }
 

@@ -100,10 +100,11 @@ fn step_and_time(line: Line<'_>) -> (Option<i64>, Option<f64>) {
     (number, time.filter(|time| time.is_finite()))
 }
 
-/// The frames: each begins with a block `TIMESTEP`, or with one of positions behind another one.
+/// The frames: each begins with a block `TIMESTEP`, or with one of positions behind another one. One without positions is
+/// listed, too, so that reading it gives the error.
 fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut steps = Vec::new();
-    let (mut start, mut has_positions) = (text.at(), false);
+    let (mut start, mut has_positions, mut has_time) = (text.at(), false, false);
     let mut numbers = (None, None);
     let push = |steps: &mut Vec<Step>, range, (number, time)| {
         Step::push(steps, range, budget)?;
@@ -118,11 +119,13 @@ fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, Pa
         if name.is_empty() || name == END {
             continue;
         }
-        if has_positions && (is_time || is_position) {
+        if (has_positions && is_position) || ((has_positions || has_time) && is_time) {
             push(&mut steps, start..at, numbers)?;
             (start, has_positions, numbers) = (at, false, (None, None));
+            has_time = false;
         }
         has_positions |= is_position;
+        has_time |= is_time;
         if is_time {
             numbers = text.peek_line().map(step_and_time).unwrap_or_default();
         }

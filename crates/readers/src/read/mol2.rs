@@ -38,21 +38,24 @@ impl Reader for Mol2 {
         Some(StreamUnit::Words)
     }
 
-    /// A frame for each molecule.
+    /// A frame for each molecule. What is before the first one belongs to it, so that a damaged head is found.
     fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         let budget = source.budget();
         let text = source.text();
         let mut steps = Vec::new();
-        let mut start = None;
+        let (mut start, mut has_molecule) = (text.at(), false);
         while let Some(line) = text.line() {
-            if section(line) == Some(b"MOLECULE") {
-                let at = line.at;
-                if let Some(start) = start.replace(at) {
-                    Step::push(&mut steps, start..at, budget)?;
-                }
+            if section(line) != Some(b"MOLECULE") {
+                continue;
             }
+            let at = line.at;
+            if has_molecule {
+                Step::push(&mut steps, start..at, budget)?;
+                start = at;
+            }
+            has_molecule = true;
         }
-        Step::push(&mut steps, start.unwrap_or(0)..text.at(), budget)?;
+        Step::push(&mut steps, start..text.at(), budget)?;
         Ok(steps)
     }
 

@@ -157,7 +157,7 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
         // The data of reflections at panes are of what is behind
         context.restore_behind(packet);
         context.gather_data(&segments.rays, number * LANES, packet, &mut group.pixels);
-        packet.split.keep_straight(&packet.radiance);
+        packet.split.add_direct_radiance(&packet.radiance);
         group.layers.store(number, &packet.split, &packet.groups);
         context.gather_objects(&packet.hits, number, &mut group.layers);
     }
@@ -183,7 +183,7 @@ fn trace_depth<I: Integrator + ?Sized>(
         clamp.apply(segments, radiance, groups, &mut counts.lost);
         scratch.group.add(segments, &packet.radiance);
         let layers = &mut scratch.group.layers;
-        layers.add(segments, &packet.radiance, &packet.split.straight);
+        layers.add(segments, &packet.radiance, &packet.split.direct_radiance);
         layers.add_groups(segments, &packet.groups);
     }
     Some(())

@@ -28,11 +28,11 @@ pub(super) struct LightSplit {
     /// Luminance of direct light: if nothing is in the way, and what arrives.
     pub(super) direct: [Lanes; 2],
     /// Light of a camera ray and of the rays of the second depth after one interaction at most.
-    pub(super) straight: Lanes3,
+    pub(super) direct_radiance: Lanes3,
     /// Whether the rays are those of the second depth, and light is divided into classes.
-    is_second: bool,
+    is_second_depth: bool,
     /// The light that a shadow catcher lacks, if that is measured.
-    pub(super) caught: Option<Lanes3>,
+    pub(super) shadow_loss: Option<Lanes3>,
 }
 
 impl LightSplit {
@@ -40,10 +40,10 @@ impl LightSplit {
     pub(super) fn start(&mut self, channels: &Channels, depth: u32) {
         self.is_active = depth == 1 && channels.needs_light_classes();
         self.has_shadow = depth == 1 && channels.has(FilmPlane::Shadow);
-        self.is_second = depth == 2 && channels.needs_light_classes();
-        self.straight = [splat(0.0); 3];
-        let is_caught = depth == 1 && channels.has(FilmPlane::ShadowCatcher);
-        self.caught = is_caught.then_some([splat(0.0); 3]);
+        self.is_second_depth = depth == 2 && channels.needs_light_classes();
+        self.direct_radiance = [splat(0.0); 3];
+        let has_shadow_loss = depth == 1 && channels.has(FilmPlane::ShadowCatcher);
+        self.shadow_loss = has_shadow_loss.then_some([splat(0.0); 3]);
         if self.is_active {
             self.lights = [[splat(0.0); 3]; LightClass::COUNT];
             self.sum = [splat(0.0); 3];
@@ -56,9 +56,9 @@ impl LightSplit {
 
     /// Counts what was added to `radiance` since the last call as light of `class`.
     pub(super) fn take(&mut self, class: LightClass, radiance: &Lanes3) {
-        if self.is_second && class == LightClass::Background {
+        if self.is_second_depth && class == LightClass::Background {
             // Rays of the second depth that leave the scene have one interaction behind them
-            self.straight = *radiance;
+            self.direct_radiance = *radiance;
         }
         if !self.is_active {
             return;
@@ -73,18 +73,18 @@ impl LightSplit {
     }
 
     /// Counts what a camera ray has found as light after one interaction at most, without that of photons.
-    pub(super) fn keep_straight(&mut self, radiance: &Lanes3) {
-        for (straight, radiance) in self.straight.iter_mut().zip(radiance) {
-            for (straight, radiance) in straight.iter_mut().zip(radiance) {
-                *straight += radiance;
+    pub(super) fn add_direct_radiance(&mut self, radiance: &Lanes3) {
+        for (direct_radiance, radiance) in self.direct_radiance.iter_mut().zip(radiance) {
+            for (direct_radiance, radiance) in direct_radiance.iter_mut().zip(radiance) {
+                *direct_radiance += radiance;
             }
         }
     }
 
     /// Counts `light`, which photons have brought to what a camera ray meets, as light after several interactions.
-    pub(super) fn take_focused(&mut self, lane: usize, light: Vec3) {
-        let straight = lane3(&self.straight, lane) - light;
-        set_lane3(&mut self.straight, lane, straight);
+    pub(super) fn remove_photon_light(&mut self, lane: usize, light: Vec3) {
+        let direct_radiance = lane3(&self.direct_radiance, lane) - light;
+        set_lane3(&mut self.direct_radiance, lane, direct_radiance);
     }
 
     /// Divides what was added to `radiance` since the last call between diffuse and specular light, by

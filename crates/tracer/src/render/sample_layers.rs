@@ -30,9 +30,9 @@ pub(super) struct SampleLayers {
     /// The diffuse part of the reflection at the first surface.
     diffuse: Vec<Lanes3>,
     /// Radiance after one interaction at most.
-    straight: Vec<Lanes3>,
+    direct_radiance: Vec<Lanes3>,
     /// The light that a shadow catcher lacks.
-    caught: Vec<Lanes3>,
+    shadow_loss: Vec<Lanes3>,
     /// Luminance of direct light: if nothing is in the way, and what arrives.
     direct: Vec<[Lanes; 2]>,
     /// Objects and coverage of the samples of a pixel.
@@ -50,8 +50,8 @@ impl SampleLayers {
         self.lights.clear();
         self.groups.clear();
         self.diffuse.clear();
-        self.straight.clear();
-        self.caught.clear();
+        self.direct_radiance.clear();
+        self.shadow_loss.clear();
         self.direct.clear();
     }
 
@@ -63,10 +63,10 @@ impl SampleLayers {
         if self.channels.needs_light_classes() {
             self.lights.push([[splat(0.0); 3]; LightClass::COUNT]);
             self.diffuse.push([splat(0.0); 3]);
-            self.straight.push([splat(0.0); 3]);
+            self.direct_radiance.push([splat(0.0); 3]);
         }
         if self.channels.has(FilmPlane::ShadowCatcher) {
-            self.caught.push([splat(0.0); 3]);
+            self.shadow_loss.push([splat(0.0); 3]);
         }
         let groups = self.groups.len() + usize::from(self.layers.light_groups);
         self.groups.resize(groups, [splat(0.0); 3]);
@@ -98,10 +98,10 @@ impl SampleLayers {
         if split.is_active {
             self.lights[number] = split.lights;
             self.diffuse[number] = split.diffuse;
-            self.straight[number] = split.straight;
+            self.direct_radiance[number] = split.direct_radiance;
         }
-        if let Some(caught) = split.caught {
-            self.caught[number] = caught;
+        if let Some(shadow_loss) = split.shadow_loss {
+            self.shadow_loss[number] = shadow_loss;
         }
         if split.has_shadow {
             self.direct[number] = split.direct;
@@ -109,8 +109,13 @@ impl SampleLayers {
     }
 
     /// Adds the radiance along the rays of `segments`, which are not camera rays, to the classes of their samples.
-    /// `straight` is the part of it after one interaction.
-    pub(super) fn add(&mut self, segments: &SegmentPacket, radiance: &Lanes3, straight: &Lanes3) {
+    /// `direct_radiance` is the part of it after one interaction.
+    pub(super) fn add(
+        &mut self,
+        segments: &SegmentPacket,
+        radiance: &Lanes3,
+        direct_radiance: &Lanes3,
+    ) {
         if !self.channels.needs_light_classes() {
             return;
         }
@@ -120,7 +125,7 @@ impl SampleLayers {
             let lights = &mut self.lights[packet];
             for axis in 0..3 {
                 let added = radiance[axis][lane];
-                self.straight[packet][axis][to] += straight[axis][lane];
+                self.direct_radiance[packet][axis][to] += direct_radiance[axis][lane];
                 if let Some(class) = segments.first[lane].class() {
                     lights[class as usize][axis][to] += added;
                     continue;
@@ -175,13 +180,13 @@ impl SampleLayers {
         let limited = Vec3::from_slice(&color) - Vec3::from_slice(&mean);
         if self.channels.needs_light_classes() {
             self.accumulate_classes(range.clone(), limited, (tile, [column, row]));
-            let direct = mean_of(&self.straight, range.clone()) + limited;
+            let direct = mean_of(&self.direct_radiance, range.clone()) + limited;
             let indirect = Vec3::from_slice(&color) - direct;
             store(tile.components_mut(FilmPlane::Direct, column, row), direct);
             store(tile.components_mut(FilmPlane::Indirect, column, row), indirect);
         }
         if self.channels.has(FilmPlane::ShadowCatcher) {
-            let arriving = Vec3::ONE - mean_of(&self.caught, range.clone());
+            let arriving = Vec3::ONE - mean_of(&self.shadow_loss, range.clone());
             store(
                 tile.components_mut(FilmPlane::ShadowCatcher, column, row),
                 arriving.max(Vec3::ZERO),

@@ -19,6 +19,11 @@ pub(super) struct Scan {
     pose: Pose,
 }
 
+/// Maximum number of letters of the name of a scan that are kept.
+const MAX_NAME: usize = 60;
+/// Maximum number of fields of a point; real ones have up to twenty.
+const MAX_FIELDS: usize = 1000;
+
 /// A number of each point.
 #[derive(Debug)]
 pub(super) struct Field {
@@ -94,7 +99,7 @@ impl Scan {
         let Pose { rotation, translation } = &mut self.pose;
         let number = match path {
             "/name" => {
-                self.name = short(text);
+                self.name = text.chars().filter(|c| !c.is_control()).take(MAX_NAME).collect();
                 return Ok(());
             }
             "/pose/rotation/w" => &mut rotation.w,
@@ -180,6 +185,9 @@ fn open(
         scan.place = number(element, "fileOffset", at)?.unwrap_or(0);
         scan.count = number(element, "recordCount", at)?.unwrap_or(0);
     } else if inside.strip_prefix("/points/prototype/") == Some(name) {
+        if scan.fields.len() == MAX_FIELDS {
+            return Err(ParseError::malformed(at, format!("more than {MAX_FIELDS} fields")));
+        }
         if scan.field(name).is_some() {
             let what = format!("points have two fields called {}", short(name));
             return Err(ParseError::malformed(at, what));

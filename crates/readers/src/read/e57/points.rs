@@ -33,6 +33,9 @@ impl Stream<'_> {
     /// Decodes the next `bytes`. Whole numbers beyond 2^53 lose their last digits.
     #[expect(clippy::cast_possible_truncation, reason = "values have up to 64 bits")]
     fn append(&mut self, bytes: &[u8]) -> Result<(), String> {
+        if self.is_complete() {
+            return Ok(());
+        }
         let bits = self.field.kind.bits() as usize;
         self.pending.extend(bytes);
         while !self.is_complete() && self.done + bits <= 8 * self.pending.len() {

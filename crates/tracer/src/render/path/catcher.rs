@@ -109,7 +109,7 @@ impl PathIntegrator<'_> {
             let (whole, lost) = (lane3(&light.whole, lane), lane3(&light.lost, lane));
             packet.split.set_lost(lane, whole, lost);
             let shadow = catcher.strength * packet.hits.opacity[lane] * light.lost_part(lane);
-            if let Some(caught) = &mut packet.split.caught {
+            if let Some(caught) = &mut packet.split.shadow_loss {
                 set_lane3(caught, lane, (1.0 - packet.coverage[lane]) * shadow);
             }
             let throughput = lane3(&packet.throughput, lane) * (Vec3::ONE - shadow);

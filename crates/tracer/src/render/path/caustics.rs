@@ -116,7 +116,7 @@ impl PathIntegrator<'_> {
                 let light = lane3(&packet.weight, lane) * value * irradiance;
                 add_to(&mut packet.radiance, lane, light);
                 if packet.split.is_active {
-                    packet.split.take_focused(lane, light);
+                    packet.split.remove_photon_light(lane, light);
                 }
                 packet.groups.add_lane(group, lane, light);
                 sums[lane] += irradiance.max_element() * to_light;

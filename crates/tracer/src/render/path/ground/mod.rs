@@ -372,7 +372,7 @@ impl<'a> PathIntegrator<'a> {
             let weight = lane3(&packet.weight, lane) * lane3(&packet.surface.albedo, lane);
             set_lane3(&mut reflected, lane, weight * light.white(point));
             if packet.split.is_active {
-                packet.split.take_focused(lane, weight * light.caustics.white(point));
+                packet.split.remove_photon_light(lane, weight * light.caustics.white(point));
             }
             light.each_group(point, |group, white| {
                 packet.groups.add_lane(group, lane, weight * white);
