@@ -1,0 +1,89 @@
+"""Pictures of many settings on a GPU beside those of the CPU: pip install OpenEXR numpy
+
+    python3 gpu_settings.py [PROGRAM [GPU [PARTICLES [SIZE]]]]
+
+PROGRAM is `spherule` built with the feature `gpu`. Prints, for each combination, the mean of the differences of colours as a
+part of their mean, and which other channels differ. Fails if a colour differs by more than 1e-3, or coverage, ids or
+Cryptomatte at all. Compilers of drivers may fail in one variant of the kernels alone, so all are tried.
+"""
+
+import itertools
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+import OpenEXR
+
+PROGRAM, GPU, PARTICLES, SIZE = (sys.argv[1:] + ["spherule", "0", "5e3", "96x54"][len(sys.argv) - 1 :])[:4]
+MATTES = 'output.channels=["RGBA", "Z", "N", "id", "cryptomatte"]'
+DATA = 'output.channels=["RGBA", "Z", "N", "id"]'
+LIMIT = 1e-3
+LENS = "depth of field"
+
+# Each is on or off
+FLAGS = [
+    'material.type="metal"',
+    "output.transparent=true",
+    "material.opacity=0.5",
+    "render.clamp=2",
+]
+OTHERS = {
+    "plastic": ["--set", 'material.type="plastic"', "--set", "output.transparent=true"],
+    "faint": ["--set", "material.opacity=0.05"],
+    "plain ground": ["--ground", "plain"],
+    "checker": ["--ground", "checker"],
+    LENS: ["--set", "camera.aperture=0.05"],
+    "direct light": ["--set", "render.bounces=0"],
+    "ambient light": ["--set", 'render.indirect="ambient"'],
+    "colours": ["--color-by", "x"],
+    "styles": ["--style", 'x > 5: spheres, radius 0.1, color gold, material { type = "metal", roughness = 0.3 }'],
+    "whitted": ["--integrator", "whitted", "--ground", "none", "--look", "none"],
+}
+
+
+def combinations():
+    """Names and options."""
+    for number in range(2 ** len(FLAGS)):
+        chosen = [flag for bit, flag in enumerate(FLAGS) if number >> bit & 1]
+        yield ", ".join(chosen) or "default look", [word for flag in chosen for word in ("--set", flag)]
+    yield from OTHERS.items()
+
+
+def picture(folder, device, options):
+    """The channels of a still."""
+    path = str(folder / f"{device}.exr")
+    still = [PROGRAM, "still", str(folder / "box.npy"), "-o", path, "--size", SIZE, "--samples", "4", "--device", device]
+    chosen = ["--gpu", GPU] if device == "gpu" else []
+    subprocess.run(still + chosen + ["--set", "render.denoise=false"] + options, check=True, capture_output=True)
+    channels = OpenEXR.File(path, separate_channels=True).channels()
+    return {name: channel.pixels for name, channel in channels.items()}
+
+
+def main():
+    """Compares all combinations, with Cryptomatte and without."""
+    worst, failed = 0.0, []
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        generate = [PROGRAM, "generate", "box", "--particles", PARTICLES, "-o", str(folder / "box.npy"), "-q"]
+        subprocess.run(generate, check=True)
+        for (title, options), channels in itertools.product(combinations(), (DATA, MATTES)):
+            both = [picture(folder, device, ["--set", channels] + options) for device in ("cpu", "gpu")]
+            colors = [np.stack([one[name].astype("f8") for name in "RGB"]) for one in both]
+            error = np.abs(colors[0] - colors[1]).mean() / max(np.abs(colors[0]).mean(), 1e-9)
+            differ = [name for name in both[0] if name not in "RGB" and both[0][name].tobytes() != both[1][name].tobytes()]
+            # The last bits of rays through a lens differ, so that some meet other particles
+            exact = ("A",) if title == LENS else ("A", "id", "crypto")
+            important = [name for name in differ if name.startswith(exact)]
+            row = f"{title}{', Cryptomatte' if channels is MATTES else ''}"
+            print(f"{row:90} {error:.1e}  {' '.join(differ)}", flush=True)
+            worst = max(worst, error)
+            if not error <= LIMIT or important:
+                failed.append(row)
+    print(f"largest difference of colours {worst:.1e}; failed: {failed or 'none'}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
