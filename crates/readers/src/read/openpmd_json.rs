@@ -286,15 +286,15 @@ fn particles(group: Group<'_>, budget: &mut MemoryBudget) -> Result<RawParticles
     let Some(position) = records.remove(POSITION) else {
         return Err(group.malformed(format!("particles without the record {POSITION}")));
     };
-    let (axes, count) = places(position, records.remove(OFFSET), budget)?;
+    let (axes, count) = position_axes(position, records.remove(OFFSET), budget)?;
     let need = (count * size_of::<DVec3>()) as u64;
     budget.check(need, "its numbers in memory are")?;
     *budget = budget.less(need);
-    let place = |index: usize| DVec3::from_array(axes.each_ref().map(|axis| axis.at(index)));
+    let position_of = |index: usize| DVec3::from_array(axes.each_ref().map(|axis| axis.at(index)));
     let positions = if axes.iter().all(Axis::is_single) {
-        Positions::F32((0..count).map(|index| place(index).as_vec3()).collect())
+        Positions::F32((0..count).map(|index| position_of(index).as_vec3()).collect())
     } else {
-        Positions::F64((0..count).map(place).collect())
+        Positions::F64((0..count).map(position_of).collect())
     };
     let mut found = RawParticles { positions, ..RawParticles::default() };
     let mut constant = 0;
@@ -341,7 +341,7 @@ impl Axis {
 }
 
 /// The coordinates of a species, and the number of its particles.
-fn places(
+fn position_axes(
     position: Group<'_>,
     offset: Option<Group<'_>>,
     budget: &mut MemoryBudget,

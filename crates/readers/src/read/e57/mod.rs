@@ -125,11 +125,11 @@ fn open(bytes: &[u8], budget: MemoryBudget) -> Result<(Pages<'_>, Vec<Scan>), Pa
 
 /// The particles of the points of `scan` with these `values` of its fields.
 fn particles(scan: &Scan, values: &[Vec<f64>]) -> Result<RawParticles, ParseError> {
-    let places = places(scan, values)?;
+    let found = positions_of(scan, values)?;
     let positions = if has_single_positions(scan) {
-        Positions::F32(places.iter().map(|place| place.as_vec3()).collect())
+        Positions::F32(found.iter().map(|position| position.as_vec3()).collect())
     } else {
-        Positions::F64(places)
+        Positions::F64(found)
     };
     let color = fields_of(scan, COLOR);
     let mut attributes = Vec::new();
@@ -167,7 +167,7 @@ fn has_single_positions(scan: &Scan) -> bool {
 }
 
 /// The positions of the points of `scan` with these `values` of its fields; not numbers for points without a place.
-fn places(scan: &Scan, values: &[Vec<f64>]) -> Result<Vec<DVec3>, ParseError> {
+fn positions_of(scan: &Scan, values: &[Vec<f64>]) -> Result<Vec<DVec3>, ParseError> {
     let triple =
         |of: [usize; 3], point: usize| DVec3::from_array(of.map(|field| values[field][point]));
     let local: Box<dyn Fn(usize) -> DVec3> =
