@@ -40,7 +40,7 @@ fn pictures_take_as_many_samples_as_their_noise_needs() {
     workshop
         .run(&[&["still", "in", "--size", "96x54", "-o", "a.png"], &one[..]].concat())
         .expect(0);
-    // What is asked for, and what a maximum below it says
+    // The range of samples, and the error for a maximum below the least number
     let range = ["check", "in", "-o", "r/f.####.exr", "--samples", "5", "--noise", "0.04"];
     let shown = workshop.run(&range).expect(0);
     assert!(shown.text().contains(", 6 to 1024 samples (noise 0.04)"), "{}", shown.text());

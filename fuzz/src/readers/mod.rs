@@ -6,6 +6,7 @@ use spherule_formats::{MemoryBudget, ParseError, ParticleFrame, RawParticles, ch
 use spherule_formats::{hdf5 as hdf5_files, read};
 
 mod convert;
+mod e57_pages;
 mod lists;
 mod mesh;
 mod names;
@@ -122,12 +123,7 @@ pub fn las(bytes: &[u8]) -> usize {
 
 /// The content of E57, which is divided into pages with checksums here: the reader refuses pages that are damaged.
 pub fn e57(bytes: &[u8]) -> usize {
-    let mut content = bytes.to_vec();
-    content.resize(bytes.len().next_multiple_of(1020), 0);
-    let bit = |sum: u32| (sum >> 1) ^ if sum & 1 == 1 { 0x82f6_3b78 } else { 0 };
-    let byte = |sum: u32, byte: &u8| (0..8).fold(sum ^ u32::from(*byte), |sum, _| bit(sum));
-    let seal = |page: &[u8]| [page, &(!page.iter().fold(u32::MAX, byte)).to_be_bytes()].concat();
-    let pages: Vec<u8> = content.chunks(1020).flat_map(seal).collect();
+    let pages = e57_pages::sealed(bytes.to_vec());
     // Points of one bit, with fields of none
     read_all(read::e57::FORMAT, &pages, 8 * 32)
 }

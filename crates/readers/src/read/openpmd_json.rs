@@ -245,6 +245,13 @@ impl Component {
     }
 }
 
+/// Takes `bytes` for numbers from the budget.
+fn spend(budget: &mut MemoryBudget, bytes: usize) -> Result<(), ParseError> {
+    budget.check(bytes as u64, "its numbers in memory are")?;
+    *budget = budget.less(bytes as u64);
+    Ok(())
+}
+
 /// The numbers in `data`; `None` if they are of another type than real numbers, or not in one row.
 fn stored(
     data: Group<'_>,
@@ -253,9 +260,7 @@ fn stored(
 ) -> Result<Option<AttributeData>, ParseError> {
     // Floating-point numbers take twice their size while they are read, because some are missing
     let count = data.text.bytes().filter(|byte| *byte == b',').count() + 1;
-    let need = (count * size_of::<Option<f64>>()) as u64;
-    budget.check(need, "its numbers in memory are")?;
-    *budget = budget.less(need);
+    spend(budget, count * size_of::<Option<f64>>())?;
     if data.text.bytes().filter(|byte| *byte == b'[').count() != 1 {
         return Ok(None);
     }
@@ -287,9 +292,7 @@ fn particles(group: Group<'_>, budget: &mut MemoryBudget) -> Result<RawParticles
         return Err(group.malformed(format!("particles without the record {POSITION}")));
     };
     let (axes, count) = position_axes(position, records.remove(OFFSET), budget)?;
-    let need = (count * size_of::<DVec3>()) as u64;
-    budget.check(need, "its numbers in memory are")?;
-    *budget = budget.less(need);
+    spend(budget, count * size_of::<DVec3>())?;
     let position_of = |index: usize| DVec3::from_array(axes.each_ref().map(|axis| axis.at(index)));
     let positions = if axes.iter().all(Axis::is_single) {
         Positions::F32((0..count).map(|index| position_of(index).as_vec3()).collect())
@@ -312,7 +315,7 @@ fn particles(group: Group<'_>, budget: &mut MemoryBudget) -> Result<RawParticles
                 found.attributes.push(Attribute { name: short(&name), components, data });
             }
             None => found.notes.push(format!(
-                "record `{}` is left out: it is no number, or not one for each particle",
+                "record `{}` is left out: its values are not real numbers, or not one for each particle",
                 short(&name)
             )),
         }
@@ -383,9 +386,7 @@ fn attribute(
     budget: &mut MemoryBudget,
 ) -> Result<Option<(usize, AttributeData)>, ParseError> {
     let fits = |found: &Component| found.stored_count().is_none_or(|stored| stored == count);
-    let need = (3 * count * size_of::<f64>()) as u64;
-    budget.check(need, "its numbers in memory are")?;
-    *budget = budget.less(need);
+    spend(budget, 3 * count * size_of::<f64>())?;
     if let Some(scalar) = Component::of(record, budget)? {
         return Ok(fits(&scalar).then(|| (1, scalar.data(count))));
     }

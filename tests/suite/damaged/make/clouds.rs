@@ -1,5 +1,8 @@
 //! Point clouds, snapshots and geometry that are broken: LAS, LAZ, E57, PCD, GADGET, text of Houdini.
 
+#[path = "../../../../fuzz/src/readers/e57_pages.rs"]
+mod e57_pages;
+
 use super::base::{Base, find};
 use super::{Made, NAN, WHOLE, little};
 use crate::harness::sample;
@@ -84,9 +87,6 @@ pub(super) fn laz() -> Vec<Made> {
     made
 }
 
-/// Bytes of a page of E57 without the checksum behind them.
-const PAGE: usize = 1020;
-
 /// The content of an E57 file of a scan with one packet, before it is divided into pages.
 fn e57_content(points: &[[f32; 3]]) -> Vec<u8> {
     let each = u16::try_from(4 * points.len()).expect("a few points");
@@ -111,31 +111,22 @@ fn e57_content(points: &[[f32; 3]]) -> Vec<u8> {
     file
 }
 
-/// `content` in pages with checksums (CRC-32C).
-fn e57_pages(mut content: Vec<u8>) -> Vec<u8> {
-    content.resize(content.len().next_multiple_of(PAGE), 0);
-    let bit = |sum: u32| (sum >> 1) ^ if sum & 1 == 1 { 0x82f6_3b78 } else { 0 };
-    let byte = |sum: u32, byte: &u8| (0..8).fold(sum ^ u32::from(*byte), |sum, _| bit(sum));
-    let seal = |page: &[u8]| [page, &(!page.iter().fold(u32::MAX, byte)).to_be_bytes()].concat();
-    content.chunks(PAGE).flat_map(seal).collect()
-}
-
 pub(super) fn e57() -> Vec<Made> {
     let content = e57_content(&WHOLE);
     let text = |old: &str, new: &str| {
         let mut changed = super::base::replace(&content, old.as_bytes(), new.as_bytes());
         let len = changed.len() - find(&changed, b"<e57Root");
         changed[32..40].copy_from_slice(&(len as u64).to_le_bytes());
-        e57_pages(changed)
+        e57_pages::sealed(changed)
     };
     let bytes = |at: usize, new: &[u8]| {
         let mut changed = content.clone();
         changed[at..at + new.len()].copy_from_slice(new);
-        e57_pages(changed)
+        e57_pages::sealed(changed)
     };
     let xml = String::from_utf8(content[find(&content, b"<e57Root")..].to_vec()).expect("text");
     let single = "<cartesianX type=\"Float\" precision=\"single\"/>";
-    Base::new("scan", "e57", e57_pages(content.clone()))
+    Base::new("scan", "e57", e57_pages::sealed(content.clone()))
         .replace("magic", "ASTM-E57", "ASTM-E75")
         .cut_at("cut-in-head", 40)
         .cut_at("cut-in-page", 900)
@@ -157,8 +148,8 @@ pub(super) fn e57() -> Vec<Made> {
         .file("xml", text("</prototype>", "</points>"))
         .file("range", text(single, "<cartesianX type=\"Integer\" minimum=\"9\" maximum=\"8\"/>"))
         .file("no-scans", text(&xml, "<e57Root/>"))
-        .file("nan", e57_pages(e57_content(&NAN)))
-        .file("zero", e57_pages(e57_content(&[])))
+        .file("nan", e57_pages::sealed(e57_content(&NAN)))
+        .file("zero", e57_pages::sealed(e57_content(&[])))
         .made
 }
 
