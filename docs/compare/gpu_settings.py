@@ -2,9 +2,9 @@
 
     python3 gpu_settings.py [PROGRAM [GPU [PARTICLES [SIZE]]]]
 
-PROGRAM is `spherule` built with the feature `gpu`. Prints, for each combination, the mean of the differences of colours as a
-part of their mean, and which other channels differ. Fails if a colour differs by more than 1e-3, or coverage, ids or
-Cryptomatte at all. Compilers of drivers may fail in one variant of the kernels alone, so all are tried.
+PROGRAM is `spherule` built with the feature `gpu`. Prints, for each combination, the largest mean of the differences of a
+component of colours or of a part of the light, relative to the mean colour, and which other channels differ. Fails if one
+differs by more than 1e-3, or coverage, ids or Cryptomatte at all. Compilers of drivers may fail in one variant of the kernels alone, so all are tried.
 """
 
 import itertools
@@ -19,6 +19,8 @@ import OpenEXR
 PROGRAM, GPU, PARTICLES, SIZE = (sys.argv[1:] + ["spherule", "0", "5e3", "96x54"][len(sys.argv) - 1 :])[:4]
 MATTES = 'output.channels=["RGBA", "Z", "N", "id", "cryptomatte"]'
 DATA = 'output.channels=["RGBA", "Z", "N", "id"]'
+LIGHT = 'output.channels=["RGBA", "Z", "N", "id", "lights", "direct", "light_groups", "shadow", "shadow_catcher"]'
+KINDS = {"": DATA, ", Cryptomatte": MATTES, ", light by parts": LIGHT}
 LIMIT = 1e-3
 LENS = "depth of field"
 
@@ -39,6 +41,7 @@ OTHERS = {
     "ambient light": ["--set", 'render.indirect="ambient"'],
     "colours": ["--color-by", "x"],
     "styles": ["--style", 'x > 5: spheres, radius 0.1, color gold, material { type = "metal", roughness = 0.3 }'],
+    "lights": ["--set", 'light=[{ type = "sphere", position = [5, 5, 25], radius = 2, visible = true, group = "key" }]'],
     "whitted": ["--integrator", "whitted", "--ground", "none", "--look", "none"],
 }
 
@@ -62,21 +65,27 @@ def picture(folder, device, options):
 
 
 def main():
-    """Compares all combinations, with Cryptomatte and without."""
+    """Compares all combinations, plain, with Cryptomatte and with light by parts."""
     worst, failed = 0.0, []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         generate = [PROGRAM, "generate", "box", "--particles", PARTICLES, "-o", str(folder / "box.npy"), "-q"]
         subprocess.run(generate, check=True)
-        for (title, options), channels in itertools.product(combinations(), (DATA, MATTES)):
+        for (title, options), (kind, channels) in itertools.product(combinations(), KINDS.items()):
+            if channels is LIGHT and any(lacking in " ".join(options) for lacking in ("clamp", "whitted")):
+                continue
             both = [picture(folder, device, ["--set", channels] + options) for device in ("cpu", "gpu")]
-            colors = [np.stack([one[name].astype("f8") for name in "RGB"]) for one in both]
-            error = np.abs(colors[0] - colors[1]).mean() / max(np.abs(colors[0]).mean(), 1e-9)
-            differ = [name for name in both[0] if name not in "RGB" and both[0][name].tobytes() != both[1][name].tobytes()]
+            # Of the colours, and of each part of the light
+            parts = [name for name in both[0] if name[-2:] in (".R", ".G", ".B") or name == "shadow"]
+            size = max(np.mean([np.abs(both[0][name].astype("f8")).mean() for name in "RGB"]), 1e-9)
+            errors = [np.abs(both[0][name].astype("f8") - both[1][name]).mean() / size for name in ["R", "G", "B"] + parts]
+            error = max(errors)
+            others = [name for name in both[0] if name not in ["R", "G", "B"] + parts]
+            differ = [name for name in others if both[0][name].tobytes() != both[1][name].tobytes()]
             # The last bits of rays through a lens differ, so that some meet other particles
             exact = ("A",) if title == LENS else ("A", "id", "crypto")
             important = [name for name in differ if name.startswith(exact)]
-            row = f"{title}{', Cryptomatte' if channels is MATTES else ''}"
+            row = title + kind
             print(f"{row:90} {error:.1e}  {' '.join(differ)}", flush=True)
             worst = max(worst, error)
             if not error <= LIMIT or important:

@@ -36,6 +36,8 @@ pub(crate) struct Variant {
     has_mirrors: bool,
     /// Whether the first surfaces of samples are kept.
     has_objects: bool,
+    /// Whether light is kept by parts.
+    has_layers: bool,
     /// Whether radii are equal.
     is_common: bool,
     /// Levels that the stack holds.
@@ -62,6 +64,7 @@ impl Variant {
             has_detail: picture.detail().is_some(),
             has_mirrors: picture.ray_kinds().has_mirrors,
             has_objects: picture.has_objects,
+            has_layers: picture.light_groups.is_some(),
             is_common: shape.is_common,
             levels: shape.levels.max(MIN_STACK_LEVELS),
         }
@@ -75,6 +78,7 @@ impl Variant {
             ("HAS_DETAIL", self.has_detail),
             ("HAS_MIRRORS", self.has_mirrors),
             ("HAS_OBJECTS", self.has_objects),
+            ("HAS_LAYERS", self.has_layers),
         ];
         let flags = flags.map(|(name, value)| format!("const {name}: bool = {value};\n"));
         let stack = format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * self.levels);
@@ -103,6 +107,7 @@ impl Kernels {
             include_str!("shaders/camera.wgsl"),
             include_str!("shaders/surface.wgsl"),
             include_str!("shaders/lights.wgsl"),
+            include_str!("shaders/layers.wgsl"),
             include_str!("shaders/queues.wgsl"),
             include_str!("shaders/sampler.wgsl"),
             append,
@@ -112,13 +117,13 @@ impl Kernels {
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
             [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20],
-                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18],
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
+                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18, 21],
             ]
         } else {
             [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20],
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20, 21],
                 &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
                 &[0, 1, 2, 3, 6, 8, 11, 12, 13, 18],
             ]

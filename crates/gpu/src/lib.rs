@@ -42,6 +42,7 @@
 //!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128], seed: 0 },
 //!     has_odd: false,
 //!     has_objects: false,
+//!     light_groups: None,
 //!     model: Model::Whitted,
 //!     max_depth: 1,
 //!     background: Background::Constant([0.0; 3]),
@@ -60,6 +61,7 @@
 //!         radiance: [1.0; 3],
 //!         casts_shadow: true,
 //!         is_visible: false,
+//!         group: 0,
 //!     }],
 //! };
 //! renderer.trace(&device, &picture, &|| false)?;
@@ -99,7 +101,8 @@ pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
 pub use renderer::{
-    Colors, Cost, NearestSample, Pixels, Renderer, SampleObject, bytes_per_pixel, largest_array,
+    Colors, Cost, LightLayer, NearestSample, Pixels, Renderer, SampleObject, bytes_per_pixel,
+    largest_array,
 };
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use tree::{

@@ -24,6 +24,8 @@ pub(crate) struct RayKinds {
     pub(crate) has_paths: bool,
     /// Whether mirrors see the environment through a shadow catcher.
     pub(crate) has_mirrors: bool,
+    /// Whether light is kept by parts.
+    pub(crate) has_layers: bool,
     /// Number of lights.
     pub(crate) lights: u32,
 }
@@ -43,11 +45,16 @@ impl RayKinds {
 
     /// Memory of a ray that goes on, bytes.
     pub(crate) const fn ray_bytes(self) -> u64 {
-        self.shadow_bytes() + if self.has_mirrors { 16 } else { 0 }
+        self.common_bytes() + if self.has_mirrors { 16 } else { 0 }
     }
 
     /// Memory of a shadow ray, bytes.
     pub(crate) const fn shadow_bytes(self) -> u64 {
+        self.common_bytes() + if self.has_layers { 16 } else { 0 }
+    }
+
+    /// Memory of what all rays have, bytes.
+    const fn common_bytes(self) -> u64 {
         if self.has_paths { 48 } else { 32 }
     }
 }
@@ -67,6 +74,8 @@ pub struct Lighting {
     pub environment: Option<Environment>,
     /// Whether camera rays see it instead of the background.
     pub is_environment_visible: bool,
+    /// The light group of the environment.
+    pub environment_group: u32,
     /// The ground.
     pub ground: Option<Ground>,
     /// How the spheres reflect light, by the index of the first of each group; at least one, and at most
@@ -205,7 +214,8 @@ pub(crate) struct SceneUniform {
     detail_scale: [f32; 3],
     is_ambient: u32,
     detail_size: [u32; 2],
-    zeros: [u32; 2],
+    environment_group: u32,
+    zero: u32,
     finishes: [FinishUniform; MAX_FINISHES],
     harmonics: [[f32; 4]; 9],
 }
@@ -244,6 +254,7 @@ impl From<&Lighting> for SceneUniform {
             is_ambient: lighting.ambient_reach.is_some().into(),
             reach: lighting.ambient_reach.unwrap_or_default(),
             is_environment_visible: lighting.is_environment_visible.into(),
+            environment_group: lighting.environment_group,
             indirect_limit: lighting.indirect_limit.unwrap_or_default(),
             ..Self::zeroed()
         };

@@ -9,6 +9,9 @@ use crate::lighting::{Detail, Lighting, Model, RayKinds};
 /// Largest number of lights.
 pub const MAX_LIGHTS: usize = 8;
 
+/// The first light group among the layers of light, as in `shaders/layers.wgsl`.
+pub(crate) const FIRST_GROUP: u32 = 8;
+
 /// A picture to render.
 #[derive(Debug, Clone, Copy)]
 pub struct Picture<'a> {
@@ -22,6 +25,9 @@ pub struct Picture<'a> {
     pub has_odd: bool,
     /// Whether the first surface of each sample is kept, for Cryptomatte.
     pub has_objects: bool,
+    /// Number of light groups with that of light without a group, if light is kept by parts; path tracing without a limit
+    /// of indirect light only.
+    pub light_groups: Option<u32>,
     /// The transport of light.
     pub model: Model<'a>,
     /// Whitted's model: recursion depth; 1 is direct light only. Rays beyond see the background.
@@ -58,8 +64,14 @@ impl Picture<'_> {
         RayKinds {
             has_paths: self.has_paths(),
             has_mirrors: matches!(self.model, Model::Paths(Lighting { has_mirrors: true, .. })),
+            has_layers: self.light_groups.is_some(),
             lights: u32::try_from(self.lights.len()).expect("at most MAX_LIGHTS"),
         }
+    }
+
+    /// Number of layers of light.
+    pub(crate) fn layer_count(&self) -> u32 {
+        self.light_groups.map_or(0, |groups| FIRST_GROUP + groups)
     }
 
     /// Number of sources of shadow rays.
@@ -170,6 +182,8 @@ pub struct Light {
     pub casts_shadow: bool,
     /// Whether the camera sees it, if it has an extent.
     pub is_visible: bool,
+    /// Its light group; 0 is that of light without a group.
+    pub group: u32,
 }
 
 /// Where a light is.
@@ -252,7 +266,7 @@ pub(crate) struct View {
     pub(crate) sources: u32,
     pub(crate) has_odd: u32,
     pub(crate) has_extents: u32,
-    pub(crate) zero_one: u32,
+    pub(crate) layer_count: u32,
     pub(crate) sequence: [u32; 2],
     pub(crate) ambient: [f32; 3],
     pub(crate) diffuse: f32,
@@ -275,7 +289,7 @@ pub(crate) struct LightUniform {
     across: [f32; 3],
     is_visible: u32,
     along: [f32; 3],
-    zero: f32,
+    group: u32,
     normal: [f32; 3],
     zero_too: f32,
     half: [f32; 2],
@@ -305,6 +319,7 @@ impl From<&Light> for LightUniform {
             across,
             is_visible: light.is_visible.into(),
             along,
+            group: light.group,
             normal,
             half,
             ..Self::default()
@@ -361,6 +376,7 @@ impl View {
             sources: picture.sources(),
             has_odd: picture.has_odd.into(),
             has_extents: picture.has_extents().into(),
+            layer_count: picture.layer_count(),
             sequence,
             ambient: material.ambient,
             diffuse: material.diffuse,

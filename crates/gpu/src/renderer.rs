@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
-use spherule_tracer::render::device::mirrors_see_through;
+use spherule_tracer::render::device::{mirrors_see_through, needs_light_parts};
 use spherule_tracer::render::{IntegratorKind, RenderSettings};
 use spherule_tracer::scene::Scene;
 use wgpu::BindingResource;
@@ -13,7 +13,7 @@ use crate::arrays::{Array, Download, Uniform, Uniforms};
 use crate::commands::{Commands, Timer};
 use crate::kernels::{Kernels, Variant};
 use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
-use crate::picture::{FilmSize, Picture, Samples, View};
+use crate::picture::{FIRST_GROUP, FilmSize, Picture, Samples, View};
 use crate::tree::{Spheres, TreeBuilder, TreeShape};
 use crate::{Device, GpuError};
 
@@ -46,6 +46,45 @@ pub struct Pixels<'a> {
     pub nearest: &'a [NearestSample],
     /// The first surface of each sample, pixel by pixel, if the picture has them; else empty.
     pub objects: &'a [SampleObject],
+    /// Light by parts, if the picture has it, else empty: plane by plane, see [`LightLayer`], then the light groups.
+    pub layers: &'a [[f32; 4]],
+}
+
+/// A plane of [`Pixels::layers`]: sums over the samples, linear RGB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LightLayer {
+    /// Diffuse reflection by the first surface.
+    Diffuse,
+    /// Glossy reflection by the first surface.
+    Specular,
+    /// Lights that the camera sees.
+    Emission,
+    /// What the camera sees behind everything.
+    Background,
+    /// Light after one interaction at most.
+    Direct,
+    /// Luminance of direct light: if nothing is in the way, and what arrives.
+    Arrival,
+    /// The part of its light that a shadow catcher lacks.
+    Loss,
+    /// A light group, by its number.
+    Group(u32),
+}
+
+impl LightLayer {
+    /// Its number among the planes.
+    pub(crate) const fn number(self) -> u32 {
+        match self {
+            Self::Diffuse => 0,
+            Self::Specular => 1,
+            Self::Emission => 2,
+            Self::Background => 3,
+            Self::Direct => 4,
+            Self::Arrival => 5,
+            Self::Loss => 6,
+            Self::Group(group) => FIRST_GROUP + group,
+        }
+    }
 }
 
 /// The first surface of a sample, in one word.
@@ -151,6 +190,7 @@ struct Traced {
     sources: u32,
     has_odd: bool,
     has_objects: bool,
+    layers: u32,
 }
 
 #[derive(Debug, Default)]
@@ -170,12 +210,13 @@ struct TraceArrays {
     constants: Array,
     detail: Array,
     objects: Array,
+    layers: Array,
     /// The version of the tables that these three hold.
     tables: Option<u64>,
 }
 
 impl TraceArrays {
-    fn all(&self) -> [&Array; 14] {
+    fn all(&self) -> [&Array; 15] {
         let [rays, other_rays] = &self.rays;
         [
             &self.colors,
@@ -192,6 +233,7 @@ impl TraceArrays {
             &self.constants,
             &self.detail,
             &self.objects,
+            &self.layers,
         ]
     }
 
@@ -230,30 +272,46 @@ const fn object_bytes(has_objects: bool, samples: u32) -> u64 {
     if has_objects { 4 * samples as u64 } else { 0 }
 }
 
-/// What the rays of a picture of `scene` with these settings are, and the memory of the first surfaces of a pixel.
-fn needs_of(scene: &Scene, settings: &RenderSettings) -> (RayKinds, u64) {
+/// Memory of the layers of light of a pixel, bytes.
+const fn layer_bytes(layers: u32) -> u64 {
+    16 * layers as u64
+}
+
+/// Number of light groups of a picture with these settings, if it has light by parts.
+pub(crate) fn light_groups_of(settings: &RenderSettings) -> Option<u32> {
+    let channels = &settings.channels;
+    needs_light_parts(channels).then(|| channels.layers.light_groups.into())
+}
+
+/// What the rays of a picture of `scene` with these settings are, and the memory of a pixel for the first surfaces and for
+/// the layers of light.
+fn needs_of(scene: &Scene, settings: &RenderSettings) -> (RayKinds, [u64; 2]) {
+    let light_groups = light_groups_of(settings);
     let has_paths = settings.integrator == IntegratorKind::Path;
     let rays = RayKinds {
         has_paths,
         has_mirrors: has_paths && mirrors_see_through(scene, settings),
+        has_layers: light_groups.is_some(),
         lights: u32::try_from(scene.lights.len()).unwrap_or(u32::MAX),
     };
-    (rays, object_bytes(settings.channels.mattes().next().is_some(), settings.samples))
+    let objects = object_bytes(settings.channels.mattes().next().is_some(), settings.samples);
+    (rays, [objects, light_groups.map_or(0, |groups| layer_bytes(FIRST_GROUP + groups))])
 }
 
 /// The largest array for the pixels and rays of a picture, bytes.
 pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
-    let (rays, objects) = needs_of(scene, settings);
+    let (rays, [objects, layers]) = needs_of(scene, settings);
     let shadows = rays.shadow_bytes() * u64::from(rays.sources());
     let pixels = u64::from(settings.width) * u64::from(settings.height);
-    shadows.max(rays.ray_bytes()).max(objects) * pixels
+    shadows.max(rays.ray_bytes()).max(objects).max(layers) * pixels
 }
 
 /// Memory of the device for the film and the queues of each pixel, bytes.
 pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
-    let (rays, objects) = needs_of(scene, settings);
+    let (rays, [objects, layers]) = needs_of(scene, settings);
     let film = film_bytes(settings.has_features, rays.has_paths && settings.clamp.is_some());
-    4 + film + 32 + objects + 2 * rays.ray_bytes() + rays.shadow_bytes() * u64::from(rays.sources())
+    let shadows = rays.shadow_bytes() * u64::from(rays.sources());
+    4 + film + 32 + objects + layers + 2 * rays.ray_bytes() + shadows
 }
 
 impl Renderer {
@@ -353,6 +411,7 @@ impl Renderer {
             sources: picture.sources(),
             has_odd: picture.has_odd,
             has_objects: picture.has_objects,
+            layers: picture.layer_count(),
         });
         device.check()
     }
@@ -369,27 +428,33 @@ impl Renderer {
         device: &Device,
         store: impl FnOnce(&Pixels<'_>) -> T,
     ) -> Result<T, GpuError> {
-        let Traced { pixels, samples, has_odd, has_objects, .. } =
+        let Traced { pixels, samples, has_odd, has_objects, layers, .. } =
             self.traced.expect("a picture was traced");
         let film = film_bytes(has_odd, false) * pixels;
         let objects = object_bytes(has_objects, samples) * pixels;
-        self.download.reserve(device, film + 32 * pixels + objects)?;
+        let layers = layer_bytes(layers) * pixels;
+        let others = film + 32 * pixels;
+        self.download.reserve(device, others + objects + layers)?;
         let mut commands = Commands::new(device);
         commands.copy(&self.arrays.film, &self.download, [0, film]);
         commands.copy(&self.arrays.data, &self.download, [film, 32 * pixels]);
-        commands.copy(&self.arrays.objects, &self.download, [film + 32 * pixels, objects]);
+        commands.copy(&self.arrays.objects, &self.download, [others, objects]);
+        commands.copy(&self.arrays.layers, &self.download, [others + objects, layers]);
         commands.submit();
         self.download.with_content(device, |bytes| {
             #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
-            let [film, pixels, objects] = [film, pixels, objects].map(|length| length as usize);
+            let [film, pixels, objects, layers] =
+                [film, pixels, objects, layers].map(|length| length as usize);
             let (film, others) = bytes.split_at(film);
             let (sums, odd) = film.split_at(16 * pixels);
-            let (nearest, objects) = (&others[..32 * pixels], &others[32 * pixels..][..objects]);
+            let (nearest, others) = others.split_at(32 * pixels);
+            let (objects, others) = others.split_at(objects);
             store(&Pixels {
                 sums: bytemuck::cast_slice(sums),
                 odd: bytemuck::cast_slice(odd),
                 nearest: bytemuck::cast_slice(nearest),
                 objects: bytemuck::cast_slice(objects),
+                layers: bytemuck::cast_slice(&others[..layers]),
             })
         })
     }
@@ -434,6 +499,8 @@ impl Renderer {
         arrays.data.reserve(device, "pixels", 32 * pixels)?;
         let objects = object_bytes(picture.has_objects, picture.samples.count);
         arrays.objects.reserve(device, "objects of all samples", objects * pixels)?;
+        let layers = layer_bytes(picture.layer_count());
+        arrays.layers.reserve(device, "layers of light", layers * pixels)?;
         for queue in &mut arrays.rays {
             queue.reserve(device, "rays", rays.ray_bytes() * pixels)?;
         }
@@ -567,6 +634,7 @@ impl Renderer {
             17 => &arrays.constants,
             19 => &arrays.detail,
             20 => &arrays.objects,
+            21 => &arrays.layers,
             _ => return self.tree.traversal_array(binding).expect("1 to 3 are those of the tree"),
         };
         array.binding()

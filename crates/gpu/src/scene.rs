@@ -7,7 +7,8 @@ use std::sync::Arc;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
-    DeviceHit, DeviceObject, DevicePixel, DevicePixels, Extent, extent_of, store_pixels, stores_all,
+    DeviceHit, DeviceLight, DeviceObject, DevicePixel, DevicePixels, Extent, extent_of,
+    needs_light_parts, store_pixels,
 };
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
@@ -22,7 +23,7 @@ use crate::lighting::Model;
 use crate::picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-use crate::renderer::{Colors, Cost, NearestSample, Pixels, Renderer};
+use crate::renderer::{Colors, Cost, LightLayer, NearestSample, Pixels, Renderer, light_groups_of};
 use crate::scene_lighting::SceneLighting;
 use crate::tree::{Centers, KeyLength, Order, Radii, Spheres};
 use crate::{Device, GpuError};
@@ -46,7 +47,7 @@ pub enum Missing {
     LightExtent,
     /// More lights than [`MAX_LIGHTS`].
     Lights,
-    /// Channels with parts of the light.
+    /// Channels with parts of the light, in Whitted's model or with a limit of indirect light.
     Layers,
     /// Outlines and the fading with distance.
     Drawing,
@@ -67,7 +68,7 @@ impl fmt::Display for Missing {
             Self::Panorama => "equirectangular pictures",
             Self::LightExtent => "lights with an extent in Whitted's model",
             Self::Lights => "more than eight lights",
-            Self::Layers => "layers of light",
+            Self::Layers => "layers of light with render.clamp, or in Whitted's model",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
             Self::Noise => "a limit of noise",
@@ -93,7 +94,10 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (camera.projection().is_panorama(), Missing::Panorama),
         (scene.lights.iter().any(has_extent) && is_whitted, Missing::LightExtent),
         (scene.lights.len() > MAX_LIGHTS, Missing::Lights),
-        (!stores_all(&settings.channels), Missing::Layers),
+        (
+            needs_light_parts(&settings.channels) && (is_whitted || settings.clamp.is_some()),
+            Missing::Layers,
+        ),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
         (settings.noise.is_some(), Missing::Noise),
@@ -309,6 +313,7 @@ impl SceneRenderer {
             is_transparent: settings.transparent_background,
             has_odd: settings.has_features,
             has_objects: settings.channels.mattes().next().is_some(),
+            light_groups: light_groups_of(settings),
             model: match settings.integrator {
                 IntegratorKind::Whitted => Model::Whitted,
                 IntegratorKind::Path => Model::Paths(self.lighting.of(scene, source, settings)),
@@ -343,6 +348,33 @@ impl DevicePixels for SummedPixels<'_> {
         let objects = &self.pixels.objects[samples * number..][..samples];
         let surfaces = objects.iter().filter_map(|object| object.surface());
         surfaces.map(|(particle, coverage)| DeviceObject { particle, coverage })
+    }
+
+    fn light(&self, number: usize) -> DeviceLight {
+        let of = |layer| self.layer(layer, number);
+        let [whole, arriving, _] = of(LightLayer::Arrival).to_array();
+        DeviceLight {
+            diffuse: of(LightLayer::Diffuse),
+            specular: of(LightLayer::Specular),
+            emission: of(LightLayer::Emission),
+            background: of(LightLayer::Background),
+            direct: of(LightLayer::Direct),
+            luminance: [whole, arriving],
+            loss: of(LightLayer::Loss),
+        }
+    }
+
+    fn light_of_group(&self, number: usize, group: u32) -> Vec3 {
+        self.layer(LightLayer::Group(group), number)
+    }
+}
+
+impl SummedPixels<'_> {
+    /// The mean of the samples of a pixel in a layer of light.
+    fn layer(&self, layer: LightLayer, number: usize) -> Vec3 {
+        let Pixels { sums, layers, .. } = self.pixels;
+        let [r, g, b, _] = layers[layer.number() as usize * sums.len() + number];
+        Vec3::new(r, g, b) / self.samples as f32
     }
 }
 
@@ -444,6 +476,7 @@ fn light_of(light: &scene::Light) -> Light {
         radiance: extent.map_or(light.radiance, |extent| extent.radiance).to_array(),
         casts_shadow: extent.is_some() || light.casts_shadow,
         is_visible: light.is_visible,
+        group: light.group.into(),
     }
 }
 

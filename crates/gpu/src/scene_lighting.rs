@@ -73,6 +73,7 @@ impl SceneLighting {
         let catcher = lighting.ground.and_then(|ground| ground.catcher);
         lighting.ground = scene.ground.as_ref().map(|ground| ground_of(ground, catcher));
         lighting.is_environment_visible = scene.is_environment_visible;
+        lighting.environment_group = scene.environment_group.into();
         lighting.bounces = settings.traced_bounces();
         lighting.indirect_limit = settings.clamp;
         lighting.has_mirrors = mirrors_see_through(scene, settings);
@@ -108,6 +109,7 @@ fn prepared(key: &Key) -> Lighting {
         indirect_limit: None,
         has_mirrors: false,
         is_environment_visible: false,
+        environment_group: 0,
         tables,
     }
 }

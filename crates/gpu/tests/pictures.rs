@@ -163,6 +163,22 @@ fn mattes_are_those_of_the_cpu() {
     }
 }
 
+/// By the first interaction, by light group, and what a shadow takes away.
+#[test]
+fn parts_of_the_light_are_those_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    for paths in Paths::ALL {
+        let opacity = (paths == Paths::Coats).then_some(Opacity::Style(0.5));
+        let case = Case { paths: Some(paths), samples: 5, particles: 400, ..Case::small() };
+        let found =
+            support::compare(&mut renderer, &Case { has_layers: true, opacity, ..case }, level);
+        let Difference { mean, bias, layers: [difference, size], .. } = found;
+        assert!(mean.max(bias).max(difference) < 1e-3 && size > 1.0, "{paths:?}: {found:?}");
+    }
+}
+
 #[test]
 fn every_run_gives_the_same_bytes() {
     let Some(device) = device(Checks::Off) else { return };

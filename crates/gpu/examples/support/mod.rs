@@ -135,6 +135,8 @@ pub(crate) struct Case {
     pub(crate) opacity: Option<Opacity>,
     /// Cryptomatte, on a transparent background.
     pub(crate) has_mattes: bool,
+    /// Light by parts: by its first interaction, by light group, and shadows.
+    pub(crate) has_layers: bool,
     /// Limit of indirect light.
     pub(crate) clamp: Option<f32>,
 }
@@ -158,6 +160,7 @@ impl Case {
             paths: None,
             opacity: None,
             has_mattes: false,
+            has_layers: false,
             clamp: None,
         }
     }
@@ -174,8 +177,13 @@ impl Case {
 
     /// The settings of the picture.
     pub(crate) fn settings(&self) -> RenderSettings {
-        let names = ["RGBA", "Z", "N", "P", "V", "id", "cryptomatte"];
-        let names = if self.has_mattes { &names[..] } else { &names[..6] };
+        let mut names = vec!["RGBA", "Z", "N", "P", "V", "id"];
+        names.extend(self.has_mattes.then_some("cryptomatte"));
+        if self.has_layers {
+            names.extend(LAYERS.map(FilmPlane::name));
+        }
+        let mut channels = Channels::from_names(names).expect("known names");
+        channels.layers.set_light_groups(LIGHT_GROUPS);
         let is_ambient = self.paths == Some(Paths::Ambient);
         RenderSettings {
             integrator: match self.paths {
@@ -194,7 +202,7 @@ impl Case {
             seed: self.seed,
             max_depth: self.max_depth,
             clamp: self.clamp,
-            channels: Channels::from_names(names.iter().copied()).expect("known names"),
+            channels,
             window: self.window.map(|[left, top]| DataWindow {
                 image: [self.width, self.height],
                 left,
@@ -204,6 +212,24 @@ impl Case {
         }
     }
 }
+
+/// Planes with parts of the light.
+const LAYERS: [FilmPlane; 11] = [
+    FilmPlane::Diffuse,
+    FilmPlane::Specular,
+    FilmPlane::Reflection,
+    FilmPlane::Emission,
+    FilmPlane::Background,
+    FilmPlane::Direct,
+    FilmPlane::Indirect,
+    FilmPlane::LightGroups,
+    FilmPlane::Shadow,
+    FilmPlane::ShadowCatcher,
+    FilmPlane::Noisy,
+];
+
+/// Light groups: the environment, and the lights of even and of odd numbers.
+const LIGHT_GROUPS: usize = 3;
 
 /// Particles with a value each.
 pub(crate) struct Particles {
@@ -394,6 +420,10 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
         let position = DVec3::new(0.0, 0.0, 10.0);
         scene.lights.push(Light::point(position, DVec3::ZERO, Vec3::ONE));
     }
+    scene.environment_group = 1;
+    for (number, light) in (0..).zip(&mut scene.lights) {
+        light.group = 2 + number % 2;
+    }
     scene
 }
 
@@ -409,6 +439,9 @@ pub(crate) struct Difference {
     pub(crate) coverages: usize,
     /// Pixels with other objects of Cryptomatte.
     pub(crate) mattes: usize,
+    /// The largest of the means of the differences of a plane with parts of the light, relative to the mean colour; and
+    /// the mean of all these planes.
+    pub(crate) layers: [f64; 2],
     /// The largest difference of a colour.
     pub(crate) color: f32,
     /// The mean of the differences of colours, relative to the mean colour; and that of their sums over all pixels.
@@ -536,6 +569,14 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
         (0..4).map(|axis| f64::from((a[axis] - b[axis]).abs())).sum::<f64>()
     };
     let total = sum(&|_, b| rgb(b)).max(1e-9);
+    let layers = LAYERS.map(|plane| {
+        let values = |film: &Film| film.plane::<f32>(plane).unwrap_or_default().to_vec();
+        let (a, b) = (values(&found), values(&expected));
+        let pairs = a.iter().zip(&b);
+        let differences = pairs.map(|(a, b)| f64::from((a - b).abs())).sum::<f64>();
+        let size = b.iter().map(|b| f64::from(*b)).sum::<f64>();
+        [differences / total, size / total]
+    });
     let odd_means = |film: &Film| film.odd.clone().unwrap_or_default();
     let odd = odd_means(&found).into_iter().zip(odd_means(&expected));
     let secondary = |rays: RayCounts| (rays.shadow + rays.reflection) as f64;
@@ -554,6 +595,10 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
         } else {
             0
         },
+        layers: [
+            layers.iter().map(|[difference, _]| *difference).fold(0.0, f64::max),
+            layers.iter().map(|[_, size]| *size).sum(),
+        ],
         ids: differing(FilmPlane::Id, 1),
         depths: differing(FilmPlane::Depth, 1),
         normals: differing(FilmPlane::Normal, 3),

@@ -6,10 +6,12 @@
 //
 // A ray that goes on has its direction and density, and its throughput beside its origin; also the diffuse part of that
 // if mirrors see the environment through a shadow catcher (HAS_MIRRORS). A shadow ray has its direction and length, and
-// its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage.
+// its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage. With
+// layers of light, shadow rays from first surfaces have parts: the diffuse part of the reflection (of a catcher: the part of
+// the light that is lost), and the luminance.
 
 const RAY: u32 = select(3u, 4u, HAS_MIRRORS);
-const SHADOW: u32 = 3u;
+const SHADOW: u32 = select(3u, 4u, HAS_LAYERS);
 
 // Sources of shadow rays; those of the lights follow, then those of a catcher that mirrors see
 const OF_ENVIRONMENT: u32 = 0u;
@@ -39,10 +41,13 @@ struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32>, d
 struct Vertex { normal: vec3<f32>, start: vec3<f32>, base: vec3<f32>, out: vec3<f32>, finish: Finish }
 
 // A shadow ray, if it is needed
-struct Shadow { is_needed: bool, start: vec3<f32>, direction: vec3<f32>, length: f32, radiance: vec3<f32>, coverage: f32 }
+struct Shadow {
+  is_needed: bool, start: vec3<f32>, direction: vec3<f32>, length: f32, radiance: vec3<f32>, coverage: f32,
+  parts: vec4<f32>,
+}
 
 fn no_shadow() -> Shadow {
-  return Shadow(false, vec3<f32>(0.0), vec3<f32>(0.0), 0.0, vec3<f32>(0.0), ADDS);
+  return Shadow(false, vec3<f32>(0.0), vec3<f32>(0.0), 0.0, vec3<f32>(0.0), ADDS, vec4<f32>(0.0));
 }
 
 fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
@@ -51,6 +56,7 @@ fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
     shadows[SHADOW * place] = vec4<f32>(shadow.start, bitcast<f32>(pixel));
     shadows[SHADOW * place + 1u] = vec4<f32>(shadow.direction, shadow.length);
     shadows[SHADOW * place + 2u] = vec4<f32>(shadow.radiance, shadow.coverage);
+    if (HAS_LAYERS) { shadows[SHADOW * place + 3u] = shadow.parts; }
   }
 }
 
@@ -63,7 +69,16 @@ fn reflected(vertex: Vertex, weight: vec3<f32>, light: LightSample, competes: bo
 }
 
 fn shadow_of(vertex: Vertex, light: LightSample, radiance: vec3<f32>) -> Shadow {
-  return Shadow(largest_of(radiance) > 0.0, vertex.start, light.direction, light.distance, radiance, ADDS);
+  let is_needed = largest_of(radiance) > 0.0;
+  var parts = vec4<f32>(0.0);
+  if (HAS_LAYERS && stage.depth == 1u && is_needed) {
+    parts = vec4<f32>(diffuse_along(vertex, light.direction), dot(radiance, LUMINANCE));
+  }
+  return Shadow(is_needed, vertex.start, light.direction, light.distance, radiance, ADDS, parts);
+}
+
+fn diffuse_along(vertex: Vertex, direction: vec3<f32>) -> vec3<f32> {
+  return diffuse_fraction(vertex.finish, vertex.base, vertex.normal, vertex.out, direction);
 }
 
 fn sample_source(number: u32, vertex: Vertex, seed: Wide) -> LightSample {
@@ -77,8 +92,10 @@ fn sample_source(number: u32, vertex: Vertex, seed: Wide) -> LightSample {
 // the sampling of the light; a camera ray ends at the nearest visible light, which covers the pixel.
 struct Emitted { light: vec3<f32>, ends: bool }
 
-fn emitted_along(ray: Ray, path: Path, t: f32) -> Emitted {
+fn emitted_along(is_ray: bool, ray: Ray, path: Path, t: f32) -> Emitted {
   var sum = vec3<f32>(0.0);
+  var group = 0u;
+  if (!is_ray) { return Emitted(sum, false); }
   var nearest_light = FAR;
   var ends = false;
   for (var number = 0u; number < view.light_count; number++) {
@@ -88,13 +105,17 @@ fn emitted_along(ray: Ray, path: Path, t: f32) -> Emitted {
     let found = hit_light(light, ray);
     if (!found.is_hit || !(found.t < t || t >= FAR)) { continue; }
     if (path.pdf < FAR) {
-      sum += path.throughput * (balance(path.pdf, found.pdf) * light.radiance);
+      let arriving = path.throughput * (balance(path.pdf, found.pdf) * light.radiance);
+      sum += arriving;
+      add_seen(path.pixel, BY_EMISSION, light.group, arriving);
     } else if (!ends || found.t < nearest_light) {
       sum = path.throughput * light.radiance;
+      group = light.group;
       nearest_light = found.t;
       ends = true;
     }
   }
+  if (ends) { add_seen(path.pixel, BY_EMISSION, group, sum); }
   return Emitted(sum, ends);
 }
 
@@ -126,35 +147,45 @@ fn catch_shadows(
       whole += reflected(white, vec3<f32>(1.0), sample_source(number, white, seed), false);
     }
   }
+  if (is_caught) { add_arrival(pixel, dot(whole, LUMINANCE), dot(whole, LUMINANCE)); }
   let part = select(vec3<f32>(0.0), darkness / whole, whole > vec3<f32>(0.0));
   // A ray to each source
   var shadow = no_shadow();
   if (is_caught && scene.catcher.side > 0u) {
     let sample = sample_table(scene.catcher, numbers_2d(seed, ENVIRONMENT, current.sample));
-    let lost = sample.radiance * (INVERSE_PI / sample.pdf) * part;
+    let light = sample.radiance * (INVERSE_PI / sample.pdf);
     let is_above = dot(sample.direction, white.normal) > 0.0;
-    shadow = Shadow(is_above, white.start, sample.direction, FAR, -lost * behind, dot(lost, covers));
+    let parts = vec4<f32>(light * part, dot(light, LUMINANCE));
+    let lost = parts.xyz;
+    shadow = Shadow(is_above, white.start, sample.direction, FAR, -lost * behind, dot(lost, covers), parts);
   }
   push_shadow(catcher_source(0u), shadow, pixel);
   for (var number = 0u; number < view.light_count; number++) {
     shadow = no_shadow();
     if (is_caught && view.lights[number].casts_shadow == 1u) {
       let light = sample_source(number, white, seed);
-      let lost = reflected(white, vec3<f32>(1.0), light, false) * part;
+      let arriving = reflected(white, vec3<f32>(1.0), light, false);
+      let parts = vec4<f32>(arriving * part, dot(arriving, LUMINANCE));
+      let lost = parts.xyz;
       let is_needed = largest_of(lost) > 0.0;
-      shadow = Shadow(is_needed, white.start, light.direction, light.distance, -lost * behind, dot(lost, covers));
+      shadow = Shadow(is_needed, white.start, light.direction, light.distance, -lost * behind, dot(lost, covers), parts);
     }
     push_shadow(catcher_source(1u + number), shadow, pixel);
   }
 }
 
 // The light of a second surface at a distance from the first, where the path ends: an estimate (`path/ambient.rs`).
-fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide) -> vec3<f32> {
+fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide, pixel: u32) -> vec3<f32> {
   let arriving = weight * (MAX_AMBIENT * (t / (t + scene.reach)));
   var sum = vec3<f32>(0.0);
-  if (scene.environment.side > 0u) { sum = arriving * vertex.base * irradiance_at(vertex.normal) * INVERSE_PI; }
+  if (scene.environment.side > 0u) {
+    sum = arriving * vertex.base * irradiance_at(vertex.normal) * INVERSE_PI;
+    add_of_path(pixel, scene.environment_group, sum);
+  }
   for (var number = 0u; number < view.light_count; number++) {
-    sum += reflected(vertex, arriving, sample_source(number, vertex, seed), false);
+    let light = reflected(vertex, arriving, sample_source(number, vertex, seed), false);
+    sum += light;
+    add_of_path(pixel, view.lights[number].group, light);
   }
   return sum;
 }
@@ -173,6 +204,46 @@ fn roulette(next: Next, bounces: u32, seed: Wide) -> Next {
   let chance = min(largest_of(next.throughput), MAX_CONTINUATION);
   let goes_on = number_1d(seed, CONTINUATION, current.sample) < chance;
   return Next(next.is_ray && goes_on, next.direction, next.throughput / chance, next.pdf);
+}
+
+// The light group of what is behind everything
+fn group_behind() -> u32 {
+  return select(scene.environment_group, 0u, stage.depth == 1u && scene.is_environment_visible == 0u);
+}
+
+// Adds light of a group that arrives at a surface, to the layers; `diffuse`: the diffuse part of the reflection, if it is
+// the first surface.
+fn add_arriving(pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>) {
+  if (!HAS_LAYERS) { return; }
+  if (stage.depth > 1u) {
+    add_of_path(pixel, group, light);
+    return;
+  }
+  add_reflected(pixel, group, light, diffuse);
+  add_to_layer(BY_DIRECT, pixel, light);
+}
+
+// Adds light of a group that later surfaces reflect.
+fn add_of_path(pixel: u32, group: u32, light: vec3<f32>) {
+  if (HAS_LAYERS) { add_reflected(pixel, group, light, first_reflection(pixel)); }
+}
+
+// The light group of a source of shadow rays from surfaces
+fn group_of(source: u32) -> u32 {
+  if (source < FIRST_LIGHT) { return scene.environment_group; }
+  return view.lights[source - FIRST_LIGHT].group;
+}
+
+// Adds what a shadow ray brings to the layers; `part` of it. A catcher darkens what is behind it.
+fn add_shadow_parts(pixel: u32, light: vec3<f32>, adds: bool, part: f32, parts: vec4<f32>) {
+  if (adds) {
+    add_arriving(pixel, group_of(stage.source), light, parts.xyz);
+    add_arrival(pixel, 0.0, part * parts.w);
+    return;
+  }
+  add_seen(pixel, BY_BACKGROUND, group_behind(), light);
+  if (stage.depth == 1u) { add_to_layer(BY_LOSS, pixel, part * parts.xyz); }
+  add_arrival(pixel, 0.0, -part * parts.w);
 }
 
 // The place in the film of the indirect light that is being traced for a pixel
@@ -196,7 +267,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   let bounces = stage.depth - 1u;
   let t = select(ground.t, hit.t, hit.slot != MISS);
   // Lights, which may end the ray
-  let emitted = emitted_along(ray, path, t);
+  let emitted = emitted_along(is_ray, ray, path, t);
   sum += vec4<f32>(emitted.light, select(0.0, 1.0, emitted.ends));
   let is_open = is_ray && !emitted.ends;
   let is_sphere = is_open && hit.slot != MISS;
@@ -213,12 +284,15 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   // What is behind all surfaces, and behind a ground that fades out
   let uncovered = select(1.0, 1.0 - ground.opacity, is_ground && !is_caught);
   if (is_open && !is_sphere && uncovered > 0.0) {
+    var seen: vec3<f32>;
     if (is_first) {
-      sum += vec4<f32>(uncovered * seen_behind(ray, path.on_film), 0.0);
+      seen = uncovered * seen_behind(ray, path.on_film);
     } else {
       let pdf = select(path.pdf, FAR, is_ground);
-      sum += vec4<f32>(uncovered * path.throughput * environment_along(ray.direction, pdf), 0.0);
+      seen = uncovered * path.throughput * environment_along(ray.direction, pdf);
     }
+    sum += vec4<f32>(seen, 0.0);
+    add_seen(path.pixel, BY_BACKGROUND, group_behind(), seen);
   }
   // A glossy reflection sees the environment through a catcher
   var weight = path.throughput;
@@ -227,6 +301,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   if (is_passed) {
     behind = ground.opacity * weight * (1.0 - path.diffuse) * environment_along(ray.direction, FAR);
     sum += vec4<f32>(behind, 0.0);
+    add_seen(path.pixel, BY_BACKGROUND, scene.environment_group, behind);
     weight *= path.diffuse;
   }
   // The first surface reflects this light, which has no limit
@@ -256,7 +331,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   let is_mirror = is_passed && largest_of(path.diffuse) == 0.0;
   var is_shaded = (is_sphere || is_ground) && !is_caught && !is_mirror && bounces <= scene.bounces;
   if (is_shaded && scene.is_ambient == 1u && bounces > 0u) {
-    sum += vec4<f32>(ambient_light(vertex, weight, t, seed), 0.0);
+    sum += vec4<f32>(ambient_light(vertex, weight, t, seed, path.pixel), 0.0);
     is_shaded = false;
   }
   // Light of the environment
@@ -267,6 +342,9 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     shadow = shadow_of(vertex, light, reflected(vertex, weight, light, true));
   }
   push_shadow(OF_ENVIRONMENT, shadow, path.pixel);
+  // Luminance of direct light: if nothing is in the way, and what arrives without a shadow ray
+  var whole = shadow.parts.w;
+  var unshadowed = 0.0;
   // Light of each source
   for (var number = 0u; number < view.light_count; number++) {
     shadow = no_shadow();
@@ -275,23 +353,30 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
       let light = sample_source(number, vertex, seed);
       let radiance = reflected(vertex, weight, light, has_extent(source));
       shadow = shadow_of(vertex, light, radiance);
+      whole += shadow.parts.w;
       if (shadow.is_needed && source.casts_shadow == 0u) {
         sum += vec4<f32>(radiance, 0.0);
+        add_arriving(path.pixel, source.group, radiance, shadow.parts.xyz);
+        unshadowed += shadow.parts.w;
         shadow.is_needed = false;
       }
     }
     push_shadow(FIRST_LIGHT + number, shadow, path.pixel);
   }
+  if (is_shaded) { add_arrival(path.pixel, whole, unshadowed); }
   // Go on in a direction of the BSDF; the last segment may be a shadow ray to the environment
   var next = Next(false, vec3<f32>(0.0), vec3<f32>(0.0), 0.0);
   shadow = no_shadow();
   if (is_shaded) {
     next = next_ray(vertex, weight, seed);
     next.is_ray = next.is_ray && largest_of(next.throughput) > 0.0;
+    var diffuse = vec3<f32>(1.0);
+    if (HAS_LAYERS && is_first && next.is_ray) { diffuse = diffuse_along(vertex, next.direction); }
+    keep_first_reflection(path.pixel, diffuse);
     if (bounces == scene.bounces && view.has_extents == 0u) {
       let radiance = next.throughput * environment_along(next.direction, next.pdf);
       let is_needed = next.is_ray && largest_of(radiance) > 0.0;
-      shadow = Shadow(is_needed, vertex.start, next.direction, FAR, radiance, ADDS);
+      shadow = Shadow(is_needed, vertex.start, next.direction, FAR, radiance, ADDS, vec4<f32>(diffuse, 0.0));
       next.is_ray = false;
     } else {
       next = roulette(next, bounces, seed);
@@ -304,8 +389,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
     if (HAS_MIRRORS) {
-      let diffuse = diffuse_fraction(vertex.finish, vertex.base, vertex.normal, vertex.out, next.direction);
-      next_rays[RAY * place + 3u] = vec4<f32>(diffuse, 0.0);
+      next_rays[RAY * place + 3u] = vec4<f32>(diffuse_along(vertex, next.direction), 0.0);
     }
   }
   if (is_ray) {
@@ -382,6 +466,7 @@ fn trace_shadow(
   if (part == 0.0) { return; }
   let coverage = part * select(0.0, light.w, !adds && view.transparent == 1u);
   let pixel = bitcast<u32>(start.w);
+  if (HAS_LAYERS) { add_shadow_parts(pixel, part * light.xyz, adds, part, shadows[place + 3u]); }
   // What the first surface reflects of a catcher has no limit
   if (HAS_CLAMP && stage.depth > select(2u, 1u, adds)) {
     film[indirect_place(pixel)] += vec4<f32>(part * light.xyz, 0.0);

@@ -65,6 +65,7 @@ fn object_of_ground(coverage: f32) -> u32 { return bitcast<u32>(-coverage); }
 
 // Empties a pixel before its first sample.
 fn clear_pixel(pixel: u32) {
+  clear_layers(pixel);
   film[pixel] = vec4<f32>(0.0);
   if (view.has_odd == 1u) { film[view.width * view.height + pixel] = vec4<f32>(0.0); }
   data[2u * pixel] = vec4<u32>(bitcast<u32>(FAR), MISS, 0u, 0u);

@@ -17,9 +17,9 @@ struct SceneUniform {
   catcher: Table,
   // First pixel of the image of the environment; the largest component of the indirect light along a ray
   image: u32, is_environment_visible: u32, indirect_limit: f32, finish_count: u32,
-  // The image at its own resolution: its size, and a factor on its radiance
+  // The image at its own resolution: its size, and a factor on its radiance; the light group of the environment
   detail_scale: vec3<f32>, is_ambient: u32,
-  detail_size: vec2<u32>, zeros: vec2<u32>,
+  detail_size: vec2<u32>, environment_group: u32, zero: u32,
   // How spheres reflect light, by the first index of each group
   finishes: array<Finish, 65>,
   // Irradiance of the environment

@@ -7,10 +7,10 @@ struct Light {
   kind: u32,
   radiance: vec3<f32>,
   casts_shadow: u32,
-  // Axes of panels: along their width and height, and in the direction that they shine
+  // Axes of panels: along their width and height, and in the direction that they shine. `group`: the light group
   across: vec3<f32>,
   is_visible: u32,
-  along: vec3<f32>, zero: f32,
+  along: vec3<f32>, group: u32,
   normal: vec3<f32>, zero_too: f32,
   // Half the width and height; the radius of spheres; for suns, 1 minus the cosine of half the apparent diameter
   half: vec2<f32>, zeros: vec2<f32>,
@@ -35,9 +35,9 @@ struct View {
   background_top: vec3<f32>, transparent: u32,
   background_up: vec3<f32>, color_kind: u32,
   // Radius of the lens and distance of the focus; 0 is a pinhole. Number of sources of shadow rays. Whether every second
-  // sample is kept, and whether rays can hit lights
+  // sample is kept, whether rays can hit lights, and the number of layers of light
   lens_radius: f32, lens_focus: f32, sources: u32, has_odd: u32,
-  has_extents: u32, zero_one: u32,
+  has_extents: u32, layer_count: u32,
   // Changes the seeds of paths: the lower and the upper half
   sequence: vec2<u32>,
   // Material: ambient light times `Ka`, and the constants of Blinn and Phong

@@ -19,6 +19,7 @@ use super::{
     cryptomatte::rank,
     film::{Film, FilmTile, bounded},
     planes::FilmPlane,
+    sample_layers::store,
     settings::{RenderError, RenderSettings},
     source::ShadeSource,
 };
@@ -61,6 +62,25 @@ pub struct DeviceObject {
     pub coverage: f32,
 }
 
+/// The light of a pixel by parts, each the mean of the samples, linear RGB.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceLight {
+    /// Of the diffuse reflection by the first surface.
+    pub diffuse: Vec3,
+    /// Of the glossy reflection by the first surface.
+    pub specular: Vec3,
+    /// Of lights that the camera sees.
+    pub emission: Vec3,
+    /// Of what the camera sees behind everything.
+    pub background: Vec3,
+    /// After one interaction at most.
+    pub direct: Vec3,
+    /// Luminance of direct light: if nothing is in the way, and what arrives.
+    pub luminance: [f32; 2],
+    /// The part of its light that a shadow catcher lacks.
+    pub loss: Vec3,
+}
+
 /// What a device found in the pixels of a picture, by their number, row by row from the top.
 pub trait DevicePixels: Sync {
     /// The means and the nearest intersection.
@@ -68,12 +88,18 @@ pub trait DevicePixels: Sync {
 
     /// The objects of the samples, without those that show neither a particle nor the ground. For Cryptomatte.
     fn objects(&self, number: usize) -> impl Iterator<Item = DeviceObject>;
+
+    /// The light by parts, of opaque scenes. Only if [`needs_light_parts`].
+    fn light(&self, number: usize) -> DeviceLight;
+
+    /// The mean light of a group, the first of which is that of light without a group. Only if [`needs_light_parts`].
+    fn light_of_group(&self, number: usize, group: u32) -> Vec3;
 }
 
-/// Whether [`store_pixels`] fills all planes of `channels`: those of the nearest sample of each pixel, and of Cryptomatte.
-pub fn stores_all(channels: &Channels) -> bool {
-    let mut planes = FilmPlane::all().filter(|plane| channels.has(*plane));
-    planes.all(|plane| plane.is_from_nearest() || plane.is_matte())
+/// Whether planes of `channels` have parts of the light.
+pub fn needs_light_parts(channels: &Channels) -> bool {
+    let others = [FilmPlane::LightGroups, FilmPlane::Shadow, FilmPlane::ShadowCatcher];
+    channels.needs_light_classes() || others.iter().any(|plane| channels.has(*plane))
 }
 
 /// Makes `film` a picture of `scene` with these settings and `pixels`.
@@ -98,7 +124,11 @@ pub fn store_pixels(
                 let first = (tile.top + row) as usize * width as usize;
                 for column in 0..tile.width {
                     let number = first + column as usize;
-                    context.store_pixel(&mut tile, [column, row], &pixels.pixel(number));
+                    let pixel = pixels.pixel(number);
+                    context.store_pixel(&mut tile, [column, row], &pixel);
+                    if needs_light_parts(&context.settings.channels) {
+                        context.store_light(&mut tile, [column, row], &pixel, (pixels, number));
+                    }
                     if context.settings.channels.mattes().next().is_some() {
                         objects.add_up(pixels.objects(number));
                         context.store_objects(&mut tile, [column, row], &mut objects);
@@ -154,10 +184,49 @@ impl RenderContext<'_> {
         }
     }
 
+    /// Stores the light of a pixel by parts.
+    fn store_light(
+        &self,
+        tile: &mut FilmTile<'_>,
+        [column, row]: [u32; 2],
+        pixel: &DevicePixel,
+        (pixels, number): (&impl DevicePixels, usize),
+    ) {
+        // As on the CPU, what the bounds of the colour change is light of the background
+        let color = Vec3::from_slice(&bounded(pixel.color, self.catches_shadows()));
+        let limited = color - Vec3::from_slice(&pixel.color);
+        let light = pixels.light(number);
+        let direct = light.direct + limited;
+        for (plane, value) in [
+            (FilmPlane::Diffuse, light.diffuse),
+            (FilmPlane::Specular, light.specular),
+            (FilmPlane::Reflection, Vec3::ZERO),
+            (FilmPlane::Refraction, Vec3::ZERO),
+            (FilmPlane::Emission, light.emission),
+            (FilmPlane::Background, light.background + limited),
+            (FilmPlane::Direct, direct),
+            (FilmPlane::Indirect, color - direct),
+            (FilmPlane::ShadowCatcher, (Vec3::ONE - light.loss).max(Vec3::ZERO)),
+        ] {
+            store(tile.components_mut(plane, column, row), value);
+        }
+        let [whole, arriving] = light.luminance;
+        let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
+        tile.components_mut(FilmPlane::Shadow, column, row).fill(lit.clamp(0.0, 1.0));
+        let groups = tile.components_mut(FilmPlane::LightGroups, column, row);
+        for (group, components) in (0..).zip(groups.chunks_mut(3)) {
+            let of_background = usize::try_from(group) == Ok(self.background_group());
+            let limited = if of_background { limited } else { Vec3::ZERO };
+            store(components, pixels.light_of_group(number, group) + limited);
+        }
+    }
+
     fn store_pixel(&self, tile: &mut FilmTile<'_>, [column, row]: [u32; 2], pixel: &DevicePixel) {
         // A shadow catcher takes light away, sample by sample
         let is_bounded = self.catches_shadows();
-        tile.set_color(column, row, bounded(pixel.color, is_bounded));
+        let color = bounded(pixel.color, is_bounded);
+        tile.set_color(column, row, color);
+        store(tile.components_mut(FilmPlane::Noisy, column, row), Vec3::from_slice(&color));
         tile.set_odd(column, row, bounded(pixel.odd, is_bounded));
         let data = pixel.nearest.map_or(DataSample::MISS, |hit| self.data_of(&hit));
         tile.set_data(column, row, &data);

@@ -261,7 +261,7 @@ fn mean_of(samples: &[Lanes3], range: Range<usize>) -> Vec3 {
 }
 
 /// Stores `color` in the components of a pixel, if it has them.
-fn store(components: &mut [f32], color: Vec3) {
+pub(super) fn store(components: &mut [f32], color: Vec3) {
     for (component, value) in components.iter_mut().zip(color.to_array()) {
         *component = value;
     }
