@@ -88,6 +88,7 @@ mod renderer;
 mod scene;
 mod scene_lighting;
 mod self_test;
+mod spheres;
 mod tree;
 
 pub use arithmetic::Arithmetic;
@@ -105,6 +106,5 @@ pub use renderer::{
     largest_array,
 };
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
-pub use tree::{
-    Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, spheres_within, tree_bytes,
-};
+pub use spheres::{Centers, KeyLength, Order, Radii, Spheres};
+pub use tree::{MAX_SPHERES, spheres_within, tree_bytes};

@@ -14,7 +14,8 @@ use crate::commands::{Commands, Timer};
 use crate::kernels::{Kernels, Variant};
 use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
 use crate::picture::{FIRST_GROUP, FilmSize, Picture, Samples, View};
-use crate::tree::{Spheres, TreeBuilder, TreeShape};
+use crate::spheres::Spheres;
+use crate::tree::{TreeBuilder, TreeShape};
 use crate::{Device, GpuError};
 
 /// Invocations in a workgroup.

@@ -25,7 +25,7 @@ use crate::picture::{
 };
 use crate::renderer::{Colors, Cost, LightLayer, NearestSample, Pixels, Renderer, light_groups_of};
 use crate::scene_lighting::SceneLighting;
-use crate::tree::{Centers, KeyLength, Order, Radii, Spheres};
+use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
 use crate::{Device, GpuError};
 
 /// What the device lacks of the renderer for CPUs.

@@ -1,0 +1,83 @@
+//! The spheres of a frame, in plain values.
+
+/// The spheres of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Spheres<'a> {
+    /// The centres, all finite.
+    pub centers: Centers<'a>,
+    /// The radii.
+    pub radii: Radii<'a>,
+    /// The order of the centres.
+    pub order: Order,
+    /// Whether rays find all spheres with the same place and radius, instead of the first one.
+    pub keeps_copies: bool,
+}
+
+/// Centres of spheres.
+#[derive(Debug, Clone, Copy)]
+pub enum Centers<'a> {
+    /// One after the other.
+    Points(&'a [[f32; 3]]),
+    /// In blocks of 16, as in a native frame: all x of a block, then all y, then all z.
+    Blocks {
+        /// The blocks. Lanes of the last one beyond `count` are not used.
+        blocks: &'a [[f32; 48]],
+        /// Number of centres.
+        count: u64,
+    },
+}
+
+impl Centers<'_> {
+    pub(crate) const fn count(&self) -> u64 {
+        match self {
+            Self::Points(points) => points.len() as u64,
+            Self::Blocks { count, .. } => *count,
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Points(points) => bytemuck::cast_slice(points),
+            Self::Blocks { blocks, .. } => bytemuck::cast_slice(blocks),
+        }
+    }
+}
+
+/// Radii of spheres.
+#[derive(Debug, Clone, Copy)]
+pub enum Radii<'a> {
+    /// All have this one.
+    Common(f32),
+    /// One for each sphere; there may be more.
+    PerSphere(&'a [f32]),
+}
+
+/// The order in which spheres are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Any. They are sorted on the device.
+    Any(KeyLength),
+    /// Neighbours in space are near each other, as in a native frame.
+    AlongCurve,
+}
+
+/// Bits of the keys by which spheres are sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum KeyLength {
+    /// 24 bits: enough for spheres that fill their box.
+    Short,
+    /// 48 bits: also for a few spheres far from all others, which would press these into few cells.
+    Long,
+    /// 72 bits: also for clusters whose density differs by many orders of magnitude.
+    Longest,
+}
+
+impl KeyLength {
+    pub(crate) const fn words(self) -> u32 {
+        match self {
+            Self::Short => 1,
+            Self::Long => 2,
+            Self::Longest => 3,
+        }
+    }
+}
