@@ -23,6 +23,7 @@ LIGHT = 'output.channels=["RGBA", "Z", "N", "id", "lights", "direct", "light_gro
 KINDS = {"": DATA, ", Cryptomatte": MATTES, ", light by parts": LIGHT}
 LIMIT = 1e-3
 LENS = "depth of field"
+BLUR = "motion blur"
 
 # Each is on or off
 FLAGS = [
@@ -37,6 +38,7 @@ OTHERS = {
     "plain ground": ["--ground", "plain"],
     "checker": ["--ground", "checker"],
     LENS: ["--set", "camera.aperture=0.05"],
+    BLUR: ["--set", "camera.shutter=0.5", "--set", "output.frame_time=0.02"],
     "direct light": ["--set", "render.bounces=0"],
     "ambient light": ["--set", 'render.indirect="ambient"'],
     "colours": ["--color-by", "x"],
@@ -54,10 +56,10 @@ def combinations():
     yield from OTHERS.items()
 
 
-def picture(folder, device, options):
-    """The channels of a still."""
-    path = str(folder / f"{device}.exr")
-    still = [PROGRAM, "still", str(folder / "box.npy"), "-o", path, "--size", SIZE, "--samples", "4", "--device", device]
+def picture(file, device, options):
+    """The channels of a still of a file."""
+    path = str(file.with_name(f"{device}.exr"))
+    still = [PROGRAM, "still", str(file), "-o", path, "--size", SIZE, "--samples", "4", "--device", device]
     chosen = ["--gpu", GPU] if device == "gpu" else []
     subprocess.run(still + chosen + ["--set", "render.denoise=false"] + options, check=True, capture_output=True)
     channels = OpenEXR.File(path, separate_channels=True).channels()
@@ -69,12 +71,15 @@ def main():
     worst, failed = 0.0, []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        generate = [PROGRAM, "generate", "box", "--particles", PARTICLES, "-o", str(folder / "box.npy"), "-q"]
-        subprocess.run(generate, check=True)
+        box, water = folder / "box.npy", folder / "water.spf"
+        for kind, file, others in (("box", box, []), ("block", water, ["--velocity"])):
+            generate = [PROGRAM, "generate", kind, "--particles", PARTICLES, "-o", str(file), "-q"]
+            subprocess.run(generate + others, check=True)
         for (title, options), (kind, channels) in itertools.product(combinations(), KINDS.items()):
             if channels is LIGHT and any(lacking in " ".join(options) for lacking in ("clamp", "whitted")):
                 continue
-            both = [picture(folder, device, ["--set", channels] + options) for device in ("cpu", "gpu")]
+            file = water if title == BLUR else box
+            both = [picture(file, device, ["--set", channels] + options) for device in ("cpu", "gpu")]
             # Of the colours, and of each part of the light
             parts = [name for name in both[0] if name[-2:] in (".R", ".G", ".B") or name == "shadow"]
             size = max(np.mean([np.abs(both[0][name].astype("f8")).mean() for name in "RGB"]), 1e-9)

@@ -12,6 +12,7 @@ use spherule_gpu::{
 
 use super::load::{LoadedFrame, LoadedParticles};
 use super::mattes;
+use super::motion::expose;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{OpacityRule, ParticleStyle, RadiusRule, Setup, StyleForm};
 use super::shading::particle_shading;
@@ -125,7 +126,6 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
         of_scene.map(|missing| (key_of(missing), missing.to_string())),
         (picture.view.lens.is_some() && picture.render.integrator == IntegratorKind::Whitted)
             .then(|| ("camera.f_stop", Missing::Lens.to_string())),
-        (picture.view.shutter.is_some()).then(|| ("camera.shutter", "motion blur".to_owned())),
         (picture.surface.kind != SurfaceKind::Spheres)
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
         rules.first().bonds.is_some().then(|| ("bonds", "bonds".to_owned())),
@@ -203,7 +203,6 @@ fn key_of(missing: Missing) -> &'static str {
     match missing {
         Missing::Transmission => "material.transmission",
         Missing::Ground => "render.ground",
-        Missing::MotionBlur => "camera.shutter",
         Missing::Lens => "camera.f_stop",
         Missing::Stereo => "camera.stereo",
         Missing::Panorama => "camera.projection",
@@ -237,7 +236,10 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
         0
     };
     let of_pixels = bytes_per_pixel(&picture.scene, &picture.render) * pixels;
-    tree_bytes(particles, is_common) + bytes_of_color * particles + of_pixels + detail_bytes(setup)
+    tree_bytes(particles, is_common, setup.has_motion())
+        + bytes_of_color * particles
+        + of_pixels
+        + detail_bytes(setup)
 }
 
 /// Renders frame after frame on the device.
@@ -336,9 +338,12 @@ fn upload(
     particles: LoadedParticles<'_>,
 ) -> Result<BuiltParticles, TraceError> {
     match particles {
-        LoadedParticles::Decoded(frame) => {
+        LoadedParticles::Decoded(mut frame) => {
+            let shutter = setup.picture.view.shutter;
+            let displacements = shutter.map(|shutter| expose(setup, shutter, &mut frame));
             let shading = particle_shading(&setup.picture, &frame.shading);
-            renderer.prepare(&spheres(&frame), &shading).map_err(failed)?;
+            let displacements = displacements.as_deref();
+            renderer.prepare(&spheres(&frame), displacements, &shading).map_err(failed)?;
             Ok(BuiltParticles::Decoded(frame.shading))
         }
         LoadedParticles::Stored(stored) => {

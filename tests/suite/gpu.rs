@@ -144,6 +144,31 @@ mod on_a_device {
             .prints("styles of anything but spheres");
     }
 
+    /// Also of native frames, which are decoded for it.
+    #[test]
+    fn motion_blur_is_that_of_the_cpu() {
+        let Some(workshop) = workshop_with_device() else { return };
+        workshop.run(&["convert", "in", "-o", "native"]).expect(0);
+        let parts =
+            "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\", \"lights\", \"light_groups\"]";
+        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
+            let pattern = format!("{out}/f.####.exr");
+            let blurred = [
+                "render",
+                "native",
+                "-o",
+                pattern.as_str(),
+                "--set=camera.shutter=1.0",
+                "--set=output.frame_time=0.02",
+                parts,
+            ];
+            workshop.run(&[&blurred[..], &SMALL, device].concat()).expect(0);
+        }
+        assert_equal(&workshop, ["gpu", "cpu"]);
+        let report = workshop.report("gpu");
+        assert!(report["frames"][0]["device"].is_object(), "{report}");
+    }
+
     /// A device that is a program on the CPU is taken only where it is asked for.
     #[test]
     fn a_device_is_chosen_where_it_suits() {

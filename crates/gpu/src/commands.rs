@@ -16,7 +16,7 @@ const ROW: u64 = 32_768;
 #[derive(Debug)]
 pub(crate) struct Kernel {
     pipeline: ComputePipeline,
-    bindings: &'static [u32],
+    bindings: Vec<u32>,
 }
 
 impl Kernel {
@@ -25,7 +25,7 @@ impl Kernel {
         device: &Device,
         module: &ShaderModule,
         entry: &str,
-        bindings: &'static [u32],
+        bindings: &[u32],
     ) -> Self {
         let options = PipelineCompilationOptions {
             zero_initialize_workgroup_memory: false,
@@ -39,7 +39,7 @@ impl Kernel {
             compilation_options: options,
             cache: None,
         });
-        Self { pipeline, bindings }
+        Self { pipeline, bindings: bindings.to_vec() }
     }
 }
 

@@ -15,7 +15,7 @@ use crate::GpuError;
 use crate::arithmetic::Arithmetic;
 
 /// Storage arrays that one kernel uses.
-const STORAGE_ARRAYS: u32 = 15;
+const STORAGE_ARRAYS: u32 = 17;
 /// Memory that the invocations of a workgroup share, bytes: that of the kernel that sorts tiles.
 const WORKGROUP_MEMORY: u32 = 26 << 10;
 /// Invocations of the largest workgroup.

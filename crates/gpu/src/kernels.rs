@@ -40,6 +40,8 @@ pub(crate) struct Variant {
     has_layers: bool,
     /// Whether radii are equal.
     is_common: bool,
+    /// Whether spheres and the camera move while the shutter is open.
+    has_motion: bool,
     /// Levels that the stack holds.
     levels: u32,
 }
@@ -66,6 +68,7 @@ impl Variant {
             has_objects: picture.has_objects,
             has_layers: picture.light_groups.is_some(),
             is_common: shape.is_common,
+            has_motion: shape.has_motion,
             levels: shape.levels.max(MIN_STACK_LEVELS),
         }
     }
@@ -94,10 +97,16 @@ impl Kernels {
         } else {
             include_str!("shaders/append_atomic.wgsl")
         };
+        let motion = if variant.has_motion {
+            include_str!("shaders/moving.wgsl")
+        } else {
+            include_str!("shaders/still.wgsl")
+        };
         let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
         let source = [
             device.arithmetic().source(),
             &tree_constants(variant.is_common),
+            motion,
             &variant.constants(),
             GROUPS,
             include_str!("shaders/view.wgsl"),
@@ -114,7 +123,9 @@ impl Kernels {
             &model.concat(),
         ];
         let module = device.module(&source.concat());
-        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
+        let kernel = |entry, bindings: &[u32]| Kernel::new(device, &module, entry, bindings);
+        let of_motion: &[u32] = if variant.has_motion { &[22] } else { &[] };
+        let tracing = |entry, bindings: &[u32]| kernel(entry, &[bindings, of_motion].concat());
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
             [
                 &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
@@ -130,9 +141,9 @@ impl Kernels {
         };
         Self {
             empty_queues: kernel("empty_queues", &[8, 13, 14]),
-            trace_camera: kernel("trace_camera", camera),
-            trace_next: kernel("trace_next", next),
-            trace_shadow: kernel("trace_shadow", shadow),
+            trace_camera: tracing("trace_camera", camera),
+            trace_next: tracing("trace_next", next),
+            trace_shadow: tracing("trace_shadow", shadow),
             clamp_indirect: (variant.has_clamp)
                 .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18])),
         }

@@ -25,6 +25,7 @@
 //!     centers: Centers::Points(&[[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]]),
 //!     radii: Radii::Common(0.8),
 //!     order: Order::Any(KeyLength::Short),
+//!     displacements: None,
 //!     keeps_copies: false,
 //! };
 //! renderer.prepare(&device, &spheres, Colors::Constant([0.8, 0.2, 0.1]))?;
@@ -38,6 +39,7 @@
 //!         is_parallel: false,
 //!         lens: None,
 //!     },
+//!     exposure: None,
 //!     film,
 //!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128], seed: 0 },
 //!     has_odd: false,

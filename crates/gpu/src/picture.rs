@@ -17,6 +17,8 @@ pub(crate) const FIRST_GROUP: u32 = 8;
 pub struct Picture<'a> {
     /// The camera.
     pub camera: Camera,
+    /// The camera when the shutter opens and when it closes. If the spheres move, else their displacements are missing.
+    pub exposure: Option<[Camera; 2]>,
     /// Size of the film.
     pub film: FilmSize,
     /// Where the samples of pixels are.
@@ -236,14 +238,7 @@ impl LightPlace {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 pub(crate) struct View {
-    pub(crate) eye: [f32; 3],
-    pub(crate) zero: f32,
-    pub(crate) right: [f32; 3],
-    pub(crate) half_width: f32,
-    pub(crate) up: [f32; 3],
-    pub(crate) half_height: f32,
-    pub(crate) forward: [f32; 3],
-    pub(crate) is_parallel: u32,
+    pub(crate) camera: CameraUniform,
     pub(crate) size: [f32; 2],
     pub(crate) corner: [i32; 2],
     pub(crate) width: u32,
@@ -276,7 +271,33 @@ pub(crate) struct View {
     pub(crate) reflection: f32,
     pub(crate) ior: f32,
     pub(crate) is_exact_fresnel: u32,
+    pub(crate) open: CameraUniform,
+    pub(crate) close: CameraUniform,
     pub(crate) lights: [LightUniform; MAX_LIGHTS],
+}
+
+/// The structure `CameraAt` of the shaders.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub(crate) struct CameraUniform {
+    eye: [f32; 3],
+    zero: f32,
+    right: [f32; 3],
+    half_width: f32,
+    up: [f32; 3],
+    half_height: f32,
+    forward: [f32; 3],
+    is_parallel: u32,
+}
+
+impl From<&Camera> for CameraUniform {
+    fn from(camera: &Camera) -> Self {
+        let [right, up, forward] = camera.axes;
+        let [half_width, half_height] = camera.half_extent;
+        let is_parallel = camera.is_parallel.into();
+        let eye = camera.eye;
+        Self { eye, zero: 0.0, right, half_width, up, half_height, forward, is_parallel }
+    }
 }
 
 #[repr(C)]
@@ -335,8 +356,7 @@ impl View {
     pub(crate) fn new(picture: &Picture<'_>) -> Self {
         assert!(picture.lights.len() <= MAX_LIGHTS, "at most {MAX_LIGHTS} lights");
         let Picture { camera, film, material, .. } = picture;
-        let [right, up, forward] = camera.axes;
-        let [half_width, half_height] = camera.half_extent;
+        let [open, close] = picture.exposure.unwrap_or([*camera; 2]);
         let (bottom, top, background_up, background_kind) = match picture.background {
             Background::Constant(color) => (color, color, [0.0; 3], 0),
             Background::Gradient { bottom, top, up, has_backdrop } => {
@@ -352,13 +372,9 @@ impl View {
         let sequence = bytemuck::cast(PathSeed::sequence_bits(picture.samples.seed).to_le_bytes());
         let [lens_radius, lens_focus] = camera.lens.unwrap_or_default();
         Self {
-            eye: camera.eye,
-            right,
-            half_width,
-            up,
-            half_height,
-            forward,
-            is_parallel: camera.is_parallel.into(),
+            camera: camera.into(),
+            open: (&open).into(),
+            close: (&close).into(),
             size: camera.size,
             corner: film.corner,
             width: film.width,

@@ -374,7 +374,8 @@ impl Renderer {
     /// If `is_stopped` returns true, which is asked after each part of the picture, or if the device fails.
     ///
     /// # Panics
-    /// If the picture has too many lights, or no set of samples for each pixel.
+    /// If the picture has too many lights, or no set of samples for each pixel, or if it has an exposure and the spheres have
+    /// no displacements, or the other way round.
     pub fn trace(
         &mut self,
         device: &Device,
@@ -383,6 +384,7 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         self.reserve(device, picture)?;
         let shape = *self.tree.shape();
+        assert_eq!(shape.has_motion, picture.exposure.is_some(), "both move, or none");
         let variant = Variant::of(picture, &shape, self.has_opacity);
         self.kernels.entry(variant).or_insert_with(|| Kernels::new(device, variant));
         let plan = self.plan(picture, &shape);

@@ -35,8 +35,6 @@ pub enum Missing {
     Transmission,
     /// A ground in Whitted's model, or one with sand or a picture.
     Ground,
-    /// Motion blur.
-    MotionBlur,
     /// Depth of field in Whitted's model.
     Lens,
     /// Two eyes.
@@ -62,7 +60,6 @@ impl fmt::Display for Missing {
         f.write_str(match self {
             Self::Transmission => "transmissive particles",
             Self::Ground => "a ground in Whitted's model, or one of sand or with a picture",
-            Self::MotionBlur => "motion blur",
             Self::Lens => "depth of field in Whitted's model",
             Self::Stereo => "stereo pairs",
             Self::Panorama => "equirectangular pictures",
@@ -88,7 +85,6 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     [
         (material.transmission > 0.0, Missing::Transmission),
         (scene.ground.as_ref().is_some_and(|ground| !is_plain(ground)), Missing::Ground),
-        (scene.exposure.is_some(), Missing::MotionBlur),
         (camera.lens().is_some() && is_whitted, Missing::Lens),
         (camera.stereo().is_some(), Missing::Stereo),
         (camera.projection().is_panorama(), Missing::Panorama),
@@ -167,13 +163,15 @@ impl SceneRenderer {
         &self.device
     }
 
-    /// Copies `spheres` with the colours of `source` to the device, and starts to build their tree.
+    /// Copies `spheres` with the colours of `source` to the device, and starts to build their tree. `displacements`: by how
+    /// far each of them moves while the shutter is open, for scenes with an exposure.
     ///
     /// # Errors
     /// If they do not fit, or if the device fails.
     pub fn prepare(
         &mut self,
         spheres: &accel::Spheres<'_>,
+        displacements: Option<&[Vec3]>,
         source: &dyn ShadeSource,
     ) -> Result<(), GpuError> {
         let radii = match spheres.radius {
@@ -183,7 +181,9 @@ impl SceneRenderer {
         let order = Order::Any(key_length(spheres.centers));
         let centers = Centers::Points(bytemuck::cast_slice(spheres.centers));
         let keeps_copies = source.is_translucent();
-        self.start(&Spheres { centers, radii, order, keeps_copies }, spheres.centers.len(), source)
+        let displacements = displacements.map(bytemuck::cast_slice);
+        let all = Spheres { centers, radii, order, displacements, keeps_copies };
+        self.start(&all, spheres.centers.len(), source)
     }
 
     /// Same as [`Self::prepare`], of the leaves of a native frame, whose particles are in the order of a tree. `radius` is
@@ -221,6 +221,7 @@ impl SceneRenderer {
             centers,
             radii,
             order: Order::AlongCurve,
+            displacements: None,
             keeps_copies: source.is_translucent(),
         };
         let count = usize::try_from(leaves.count).unwrap_or(usize::MAX);
@@ -253,6 +254,9 @@ impl SceneRenderer {
     ///
     /// # Errors
     /// If `stop` is raised, if a setting is out of range, or if the device fails.
+    ///
+    /// # Panics
+    /// If the scene has an exposure and the spheres have no displacements, or the other way round.
     pub fn render_into(
         &mut self,
         film: &mut Film,
@@ -299,8 +303,10 @@ impl SceneRenderer {
         let size = film_size(settings);
         self.samples.fit(size, settings);
         let lights: Vec<_> = scene.lights.iter().map(light_of).collect();
+        let exposure = scene.exposure.as_ref().map(|exposure| exposure.cameras);
         let picture = Picture {
-            camera: camera_of(scene, settings),
+            camera: camera_of(&scene.camera, settings),
+            exposure: exposure.map(|cameras| cameras.each_ref().map(|c| camera_of(c, settings))),
             film: size,
             samples: Samples {
                 count: settings.samples,
@@ -406,8 +412,7 @@ fn film_size(settings: &RenderSettings) -> FilmSize {
     FilmSize { width, height, corner: [window.left, window.top] }
 }
 
-fn camera_of(scene: &Scene, settings: &RenderSettings) -> Camera {
-    let camera = &scene.camera;
+fn camera_of(camera: &scene::Camera, settings: &RenderSettings) -> Camera {
     Camera {
         eye: camera.eye().to_array(),
         axes: camera.axes().map(|axis| axis.to_array()),

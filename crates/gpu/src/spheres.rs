@@ -9,6 +9,9 @@ pub struct Spheres<'a> {
     pub radii: Radii<'a>,
     /// The order of the centres.
     pub order: Order,
+    /// By how far each sphere moves from the opening of the shutter to its closing, around its centre; there may be more. For
+    /// pictures with an exposure.
+    pub displacements: Option<&'a [[f32; 3]]>,
     /// Whether rays find all spheres with the same place and radius, instead of the first one.
     pub keeps_copies: bool,
 }

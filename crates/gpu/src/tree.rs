@@ -44,6 +44,8 @@ pub(crate) struct TreeShape {
     pub(crate) padding: f32,
     /// Whether all spheres have the same radius.
     pub(crate) is_common: bool,
+    /// Whether spheres move while the shutter is open.
+    pub(crate) has_motion: bool,
     /// Whether all copies of a sphere are kept.
     keeps_copies: bool,
     /// Number of spheres.
@@ -70,8 +72,8 @@ struct Build {
 
 /// What kernels for keys depend on: the length, and whether centres are in blocks.
 type KeyVariant = (KeyLength, bool);
-/// What kernels for nodes depend on: whether radii are equal, and whether centres are in blocks.
-type NodeVariant = (bool, bool);
+/// What kernels for nodes depend on: whether radii are equal, whether centres are in blocks, and whether spheres move.
+type NodeVariant = (bool, bool, bool);
 
 /// Kernels for keys of one length.
 #[derive(Debug)]
@@ -131,16 +133,18 @@ struct NodeKernels {
 }
 
 impl NodeKernels {
-    fn new(device: &Device, (is_common, is_in_blocks): NodeVariant) -> Self {
-        let in_blocks = format!("const IN_BLOCKS: bool = {is_in_blocks};\n");
+    fn new(device: &Device, (is_common, is_in_blocks, has_motion): NodeVariant) -> Self {
+        let in_blocks = format!(
+            "const IN_BLOCKS: bool = {is_in_blocks};\nconst HAS_MOTION: bool = {has_motion};\n"
+        );
         let constants = tree_constants(is_common);
         let kernels = include_str!("shaders/nodes.wgsl");
         let source = [&constants, &in_blocks, BUILD, GROUPS, CENTERS, kernels];
         let module = device.module(&source.concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
-            gather_spheres: kernel("gather_spheres", &[0, 1, 3, 7, 8, 9]),
-            block_boxes: kernel("block_boxes", &[0, 1, 3, 7, 8, 11]),
+            gather_spheres: kernel("gather_spheres", &[0, 1, 3, 7, 8, 9, 13, 14]),
+            block_boxes: kernel("block_boxes", &[0, 1, 3, 7, 8, 11, 14]),
             build_level: kernel("build_level", &[0, 10, 11, 12]),
         }
     }
@@ -181,10 +185,12 @@ struct TreeArrays {
     order: Array,
     boxes: [Array; 2],
     nodes: Array,
+    displacements: Array,
+    moves: Array,
 }
 
 impl TreeArrays {
-    fn all(&self) -> [&Array; 12] {
+    fn all(&self) -> [&Array; 14] {
         let [first, second] = &self.pairs;
         let [boxes, other_boxes] = &self.boxes;
         [
@@ -200,6 +206,8 @@ impl TreeArrays {
             boxes,
             other_boxes,
             &self.nodes,
+            &self.displacements,
+            &self.moves,
         ]
     }
 }
@@ -219,13 +227,15 @@ fn level_sizes(blocks: u64) -> Vec<u64> {
     sizes
 }
 
-/// Memory of the device to build and trace a tree of `count` spheres, bytes.
-pub fn tree_bytes(count: u64, is_common: bool) -> u64 {
+/// Memory of the device to build and trace a tree of `count` spheres, bytes. `has_motion`: they move while the shutter is
+/// open.
+pub fn tree_bytes(count: u64, is_common: bool, has_motion: bool) -> u64 {
     let blocks = block_count(count);
     let nodes: u64 = level_sizes(blocks).iter().sum();
     let radii = if is_common { 0 } else { 4 + 4 };
     let of_spheres = (12 + 2 * 8 + radii) * count + BYTES_OF_SPHERE * blocks * BLOCK;
-    of_spheres + 1024 * count.div_ceil(TILE) + 48 * blocks + 64 * nodes
+    let of_motion = if has_motion { 12 * count + 16 * blocks * BLOCK } else { 0 };
+    of_spheres + of_motion + 1024 * count.div_ceil(TILE) + 48 * blocks + 64 * nodes
 }
 
 impl TreeBuilder {
@@ -272,7 +282,8 @@ impl TreeBuilder {
             Order::Any(length) => length,
             Order::AlongCurve => KeyLength::Short,
         };
-        let variants = ((length, shape.is_in_blocks), (shape.is_common, shape.is_in_blocks));
+        let variants =
+            ((length, shape.is_in_blocks), (shape.is_common, shape.is_in_blocks, shape.has_motion));
         self.keys.entry(variants.0).or_insert_with(|| KeyKernels::new(device, variants.0));
         self.nodes.entry(variants.1).or_insert_with(|| NodeKernels::new(device, variants.1));
         // Record and start all stages
@@ -302,6 +313,7 @@ impl TreeBuilder {
             1 => Some(self.arrays.nodes.binding()),
             2 => Some(self.arrays.spheres.binding()),
             3 => Some(self.arrays.order.binding()),
+            22 => Some(self.arrays.moves.binding()),
             _ => None,
         }
     }
@@ -328,7 +340,12 @@ impl TreeBuilder {
         for boxes in &mut arrays.boxes {
             boxes.reserve(device, "boxes", 24 * blocks)?;
         }
+        let moves = if spheres.displacements.is_some() { 16 * blocks * BLOCK } else { 0 };
+        arrays.moves.reserve(device, "motion of particles", moves)?;
         // Copy what they read
+        let displacements = spheres.displacements.unwrap_or_default();
+        let bytes = bytemuck::cast_slice(displacements);
+        arrays.displacements.write(device, "motion of particles", bytes)?;
         arrays.centers.write(device, "positions", spheres.centers.bytes())?;
         match spheres.radii {
             Radii::Common(_) => {
@@ -438,6 +455,8 @@ impl TreeBuilder {
             9 => &arrays.order,
             10 => &arrays.boxes[step.side],
             11 => &arrays.boxes[1 - step.side],
+            13 => &arrays.displacements,
+            14 => &arrays.moves,
             _ => &arrays.nodes,
         };
         array.binding()
@@ -500,8 +519,11 @@ fn shape_of(spheres: &Spheres<'_>) -> Result<TreeShape, GpuError> {
         return Err(GpuError::TooLarge { what: "particles", bytes, max });
     }
     let is_in_blocks = matches!(spheres.centers, Centers::Blocks { .. });
-    let keeps_copies = spheres.keeps_copies;
-    let mut shape = TreeShape { count, is_in_blocks, keeps_copies, ..TreeShape::default() };
+    let has_motion = spheres.displacements.is_some();
+    // Spheres with the same centre may move in different directions
+    let keeps_copies = spheres.keeps_copies || has_motion;
+    let mut shape =
+        TreeShape { count, is_in_blocks, has_motion, keeps_copies, ..TreeShape::default() };
     (shape.radius, shape.is_common) = match spheres.radii {
         Radii::Common(radius) => (radius, true),
         Radii::PerSphere(_) => (0.0, false),

@@ -79,6 +79,7 @@ fn boxes_contain_all_places_once() {
                         centers: Centers::Points(&centers),
                         radii,
                         order,
+                        displacements: None,
                         keeps_copies: false,
                     },
                 );
@@ -119,6 +120,7 @@ fn neighbours_in_the_order_are_near_each_other() {
             centers: Centers::Points(&centers),
             radii,
             order: Order::Any(length),
+            displacements: None,
             keeps_copies: false,
         };
         assert!(

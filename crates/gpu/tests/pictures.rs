@@ -179,6 +179,28 @@ fn parts_of_the_light_are_those_of_the_cpu() {
     }
 }
 
+/// Each ray sees particles and the camera at its own time.
+#[test]
+fn motion_blur_is_that_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    let small = Case { has_motion: true, samples: 6, ..Case::small() };
+    for case in [
+        small,
+        Case { radii: Radii::Each, data: Data::Clusters, is_parallel: true, ..small },
+        Case { data: Data::Coincident, particles: 50, ..small },
+        Case { opacity: Some(Opacity::Each), is_studio: true, ..small },
+    ] {
+        assert_equal(&case, &support::compare(&mut renderer, &case, level));
+    }
+    for paths in [Paths::Look, Paths::Lens, Paths::Lights] {
+        let case = Case { paths: Some(paths), particles: 400, ..small };
+        let found = support::compare(&mut renderer, &case, level);
+        assert!(found.mean.max(found.bias).max(found.odd) < 1e-3, "{paths:?}: {found:?}");
+    }
+}
+
 #[test]
 fn every_run_gives_the_same_bytes() {
     let Some(device) = device(Checks::Off) else { return };

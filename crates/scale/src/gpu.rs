@@ -26,7 +26,9 @@ pub(super) fn build_and_trace(request: &CellRequest) -> Result<Measured, CellErr
     let start = Instant::now();
     let particles = peaks.during(|| Particles::of(request))?;
     let shading = ParticleShading::constant(DEFAULT_COLOR);
-    renderer.prepare(&particles.spheres(), &shading).map_err(|e| CellError::Gpu(e.to_string()))?;
+    renderer
+        .prepare(&particles.spheres(), None, &shading)
+        .map_err(|e| CellError::Gpu(e.to_string()))?;
     let load_seconds = start.elapsed().as_secs_f64();
     let count = particles.centers.len() as u64;
     drop(particles);

@@ -7,6 +7,8 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
+use spherule_surface::Shape;
+use spherule_surface::moving::MovingSpheres;
 use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{
     Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, Opacities,
@@ -17,9 +19,10 @@ use spherule_tracer::scene::environment::{
 };
 use spherule_tracer::scene::ground::{Ground, Pattern};
 use spherule_tracer::scene::{
-    Background, Camera, CameraView, ColorMap, Finish, Lens, Light, LightKind, MaterialId,
+    Background, Camera, CameraView, ColorMap, Exposure, Finish, Lens, Light, LightKind, MaterialId,
     Projection, Scene, default_lights,
 };
+use spherule_tree::accel::moving::MovingTree;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule_tree::math::{SimdLevel, narrow};
 
@@ -137,6 +140,8 @@ pub(crate) struct Case {
     pub(crate) has_mattes: bool,
     /// Light by parts: by its first interaction, by light group, and shadows.
     pub(crate) has_layers: bool,
+    /// Particles and the camera move while the shutter is open.
+    pub(crate) has_motion: bool,
     /// Limit of indirect light.
     pub(crate) clamp: Option<f32>,
 }
@@ -161,6 +166,7 @@ impl Case {
             opacity: None,
             has_mattes: false,
             has_layers: false,
+            has_motion: false,
             clamp: None,
         }
     }
@@ -237,6 +243,8 @@ pub(crate) struct Particles {
     pub(crate) common: f32,
     pub(crate) radii: Option<Vec<f32>>,
     pub(crate) values: Vec<f32>,
+    /// By how far they move while the shutter is open.
+    pub(crate) displacements: Option<Vec<Vec3>>,
 }
 
 /// Uniform numbers from 0 to 1 by the number of a draw (SplitMix64).
@@ -297,6 +305,13 @@ impl Particles {
                 .collect(),
             common,
             radii,
+            displacements: case.has_motion.then(|| {
+                let coordinate = |number: u64| 4.0 * common * (uniform(number) - 0.5);
+                let displacement = |particle: u64| {
+                    Vec3::from_array([1, 2, 3].map(|i| coordinate(8 * particle + i)))
+                };
+                (0..count).map(displacement).collect()
+            }),
             values: if case.is_mapped || case.opacity == Some(Opacity::Each) {
                 (0..count).map(|particle| uniform(8 * particle + 7)).collect()
             } else {
@@ -314,8 +329,17 @@ impl Particles {
     }
 }
 
-/// A scene: the camera of the thesis, turned by `angle` radians.
+/// A scene: the camera of the thesis, turned by `angle` radians. If it moves, it turns.
 pub(crate) fn scene(case: &Case, angle: f64) -> Scene {
+    let mut scene = still_scene(case, angle);
+    if case.has_motion {
+        let at = |part: f64| still_scene(case, angle + part).camera;
+        scene.exposure = Some(Exposure { cameras: [at(-0.01), at(0.02)], slices: 1 });
+    }
+    scene
+}
+
+fn still_scene(case: &Case, angle: f64) -> Scene {
     let (sin, cos) = angle.sin_cos();
     let look_at = DVec3::new(5.0 * (cos - sin), 5.0 * (cos + sin), 0.0);
     let view = CameraView { eye: DVec3::ZERO, look_at, up: DVec3::Z, fov: 45.0 };
@@ -491,7 +515,9 @@ fn color_map() -> ColorMap {
 /// Copies the particles of `case` to the device.
 pub(crate) fn prepare(renderer: &mut SceneRenderer, case: &Case) -> Result<(), GpuError> {
     let particles = Particles::new(case);
-    renderer.prepare(&particles.spheres(), &shading(case, &particles, &color_map()))
+    let displacements = particles.displacements.as_deref();
+    let map = color_map();
+    renderer.prepare(&particles.spheres(), displacements, &shading(case, &particles, &map))
 }
 
 /// The film of the device.
@@ -507,7 +533,8 @@ pub(crate) fn film_of(
     shading: &ParticleShading<'_>,
     angle: f64,
 ) -> (Film, Cost) {
-    renderer.prepare(&particles.spheres(), shading).expect("the frame fits");
+    let displacements = particles.displacements.as_deref();
+    renderer.prepare(&particles.spheres(), displacements, shading).expect("the frame fits");
     let mut film = Film::default();
     let never = AtomicBool::new(false);
     let cost = renderer
@@ -524,7 +551,7 @@ pub(crate) fn stopped(
 ) -> Result<Cost, SceneError> {
     let (particles, map) = (Particles::new(case), color_map());
     let shading = shading(case, &particles, &map);
-    renderer.prepare(&particles.spheres(), &shading)?;
+    renderer.prepare(&particles.spheres(), particles.displacements.as_deref(), &shading)?;
     let mut film = Film::default();
     renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), stop)
 }
@@ -539,9 +566,16 @@ pub(crate) fn film_of_cpu(
     let mut builder = TreeBuilder::new();
     builder.build(&particles.spheres(), &BuildSettings::default());
     builder.tree_mut().set_simd(level);
-    let surface = SphereSurface::new(builder.tree().view());
+    let mut moving = MovingTree::default();
+    let surface: Box<dyn Shape> = match &particles.displacements {
+        Some(displacements) => {
+            moving.build(&builder.tree().view(), displacements);
+            Box::new(MovingSpheres::new(&moving))
+        }
+        None => Box::new(SphereSurface::new(builder.tree().view())),
+    };
     let never = AtomicBool::new(false);
-    render(&[&surface], &scene(case, 0.0), shading, &case.settings(), &never)
+    render(&[&*surface], &scene(case, 0.0), shading, &case.settings(), &never)
         .expect("nothing stops the picture")
 }
 

@@ -12,30 +12,39 @@ fn film_position(column: u32, row: u32, sample: u32) -> vec2<f32> {
   return vec2<f32>(quotient(x, view.size.x), quotient(y, view.size.y));
 }
 
-// The ray through a position of the film.
-fn camera_ray(at: vec2<f32>) -> Ray {
+// The origin of a ray of a camera, and its direction, which has any length
+struct Line { origin: vec3<f32>, direction: vec3<f32> }
+
+// The line of a camera through a position of the film.
+fn line_of(camera: CameraAt, at: vec2<f32>) -> Line {
   // The point on the film from the middle
-  let across = mul(2.0 * at.x - 1.0, view.half_width);
-  let along = mul(1.0 - 2.0 * at.y, view.half_height);
+  let across = mul(2.0 * at.x - 1.0, camera.half_width);
+  let along = mul(1.0 - 2.0 * at.y, camera.half_height);
   // A parallel camera moves its rays, a perspective one turns them
-  let start = select(view.forward, view.eye, view.is_parallel == 1u);
-  let moved = (start + scaled(view.right, across)) + scaled(view.up, along);
-  let direction = select(moved, view.forward, view.is_parallel == 1u);
-  let scale = inverse(root(dot_in_order(direction, direction)));
-  return Ray(select(view.eye, moved, view.is_parallel == 1u), scaled(direction, scale));
+  let start = select(camera.forward, camera.eye, camera.is_parallel == 1u);
+  let moved = (start + scaled(camera.right, across)) + scaled(camera.up, along);
+  if (camera.is_parallel == 1u) { return Line(moved, camera.forward); }
+  return Line(camera.eye, moved);
+}
+
+// The ray through a position of the film, at a time from -1/2 to 1/2.
+fn camera_ray(at: vec2<f32>, time: f32) -> Ray {
+  let line = camera_line(at, time);
+  let scale = inverse(root(dot_in_order(line.direction, line.direction)));
+  return Ray(line.origin, scaled(line.direction, scale), time);
 }
 
 // Distance along the view axis of a point on a camera ray; along the ray if all are parallel.
 fn depth_of(ray: Ray, t: f32) -> f32 {
-  if (view.is_parallel == 1u) { return t; }
-  return mul(t, dot_in_order(ray.direction, view.forward));
+  if (view.camera.is_parallel == 1u) { return t; }
+  return mul(t, dot_in_order(ray.direction, view.camera.forward));
 }
 
 // Moves a ray through the centre of the lens to the point of the lens that `u` chooses. It still passes through the same
 // point of the plane in focus.
 fn through_lens(ray: Ray, u: vec2<f32>) -> Ray {
   let on_lens = on_disc(u) * view.lens_radius;
-  let offset = on_lens.x * view.right + on_lens.y * view.up;
-  let to_focus = (view.lens_focus / dot(ray.direction, view.forward)) * ray.direction - offset;
-  return Ray(ray.origin + offset, normalize(to_focus));
+  let offset = on_lens.x * view.camera.right + on_lens.y * view.camera.up;
+  let to_focus = (view.lens_focus / dot(ray.direction, view.camera.forward)) * ray.direction - offset;
+  return Ray(ray.origin + offset, normalize(to_focus), ray.time);
 }

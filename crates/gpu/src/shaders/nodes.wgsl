@@ -17,6 +17,10 @@
 @group(0) @binding(11) var<storage, read_write> boxes_out: array<f32>;
 @group(0) @binding(12) var<storage, read_write> nodes: array<vec4<u32>>;
 
+// By how far each sphere moves while the shutter is open (HAS_MOTION), and the same in the order of the tree
+@group(0) @binding(13) var<storage, read> displacements: array<f32>;
+@group(0) @binding(14) var<storage, read_write> moves: array<vec4<f32>>;
+
 const LARGEST: f32 = 3.4e38;
 // Coordinates of spheres that no ray meets
 const NOWHERE: f32 = 3e38;
@@ -35,6 +39,10 @@ fn gather_spheres(
     return;
   }
   let i = pairs[slot].y;
+  if (HAS_MOTION) {
+    let along = vec3<f32>(displacements[3u * i], displacements[3u * i + 1u], displacements[3u * i + 2u]);
+    moves[slot] = vec4<f32>(along, 0.0);
+  }
   if (COMMON_RADIUS) {
     spheres[slot] = vec4<f32>(center(i), bitcast<f32>(i));
   } else {
@@ -51,7 +59,7 @@ fn write_box(i: u32, low: vec3<f32>, high: vec3<f32>) {
 }
 
 // Boxes of blocks: of the centres with a common radius, which rays add later, otherwise of the spheres. No ray sees a copy
-// of the sphere before it, which has the lower index; without this rule, rays would test all opaque particles of a place. The
+// of the sphere before it, which has the lower index, unless spheres move; without this rule, rays would test all opaque particles of a place. The
 // box of a block that has nothing else is empty: its lowest corner is above the highest one.
 @compute @workgroup_size(256)
 fn block_boxes(
@@ -78,7 +86,9 @@ fn block_boxes(
     before = sphere;
     if (is_copy) { spheres[first + j] = vec4<f32>(vec3<f32>(NOWHERE), sphere.w); }
     if (is_copy || sphere.x == NOWHERE) { continue; }
-    let reach = vec3<f32>(select(sphere.w, 0.0, COMMON_RADIUS));
+    var reach = vec3<f32>(select(sphere.w, 0.0, COMMON_RADIUS));
+    // All places during the exposure, with the rounding of these
+    if (HAS_MOTION) { reach += 0.500001 * abs(moves[first + j].xyz) + 2.4e-7 * abs(sphere.xyz); }
     low = min(low, sphere.xyz - reach);
     high = max(high, sphere.xyz + reach);
   }

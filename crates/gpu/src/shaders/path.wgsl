@@ -409,7 +409,8 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
   if (is_ray) {
     if (current.sample == 0u) { clear_pixel(pixel); }
     path.on_film = film_position(id.x, id.y, current.sample);
-    ray = camera_ray(path.on_film);
+    ray = camera_ray(path.on_film, time_of(pixel));
+    path.on_film = seen_on_film(path.on_film, ray.time);
     if (view.lens_radius > 0.0) {
       let seed = child_of(seed_at(pixel, 0u, BOUNCED), CAMERA);
       ray = through_lens(ray, numbers_2d(seed, LENS, current.sample));
@@ -436,8 +437,8 @@ fn trace_next(
   if (is_ray) {
     let origin = rays[RAY * i];
     let direction = rays[RAY * i + 1u];
-    ray = Ray(origin.xyz, direction.xyz);
     path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0), vec3<f32>(1.0));
+    ray = Ray(origin.xyz, direction.xyz, time_of(path.pixel));
     if (HAS_MIRRORS) { path.diffuse = rays[RAY * i + 3u].xyz; }
     ground = hit_ground(ray);
     hit = nearest(ray, ground.t, number_of_end(path.pixel, BOUNCED));
@@ -458,14 +459,14 @@ fn trace_shadow(
   let start = shadows[place];
   let into = shadows[place + 1u];
   let light = shadows[place + 2u];
-  let ray = Ray(start.xyz, into.xyz);
+  let pixel = bitcast<u32>(start.w);
+  let ray = Ray(start.xyz, into.xyz, time_of(pixel));
   var passing = 0.0;
   if (!is_below_ground(ray, into.w)) { passing = transmittance(ray, into.w); }
   let adds = light.w == ADDS;
   let part = select(1.0 - passing, passing, adds);
   if (part == 0.0) { return; }
   let coverage = part * select(0.0, light.w, !adds && view.transparent == 1u);
-  let pixel = bitcast<u32>(start.w);
   if (HAS_LAYERS) { add_shadow_parts(pixel, part * light.xyz, adds, part, shadows[place + 3u]); }
   // What the first surface reflects of a catcher has no limit
   if (HAS_CLAMP && stage.depth > select(2u, 1u, adds)) {

@@ -44,6 +44,7 @@ const BSDF: u32 = 2u;
 const ENVIRONMENT: u32 = 3u;
 const LIGHTS: u32 = 4u;
 const LENS: u32 = 0u;
+const TIME: u32 = 1u;
 const OPACITY: u32 = 0xfffffffcu;
 
 fn seed_of_pixel(x: u32, y: u32) -> Wide { return mix_wide(Wide(x, y)); }

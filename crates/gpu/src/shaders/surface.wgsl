@@ -42,7 +42,7 @@ struct Surface { point: vec3<f32>, normal: vec3<f32>, start: vec3<f32>, is_enter
 
 // The point of an intersection, the normal on the side of the ray, and where rays to other surfaces start.
 fn surface_at(ray: Ray, hit: Hit) -> Surface {
-  let sphere = spheres[hit.slot];
+  let sphere = sphere_at(hit.slot, ray.time);
   let radius = radius_of(sphere);
   let v = (ray.origin + scaled(ray.direction, hit.t)) - sphere.xyz;
   let scale = inverse(root(dot_in_order(v, v)));

@@ -4,7 +4,8 @@
 // passes it in a straight line; shadow rays are attenuated by all that they enter. Spheres in which a ray starts do not
 // count then.
 //
-// Files that include this one define `view: View` with the fields used here, and `fn opacity_of(index: u32) -> f32`.
+// Files that include this one define `view: View` with the fields used here, and `fn opacity_of(index: u32) -> f32`. Spheres move or
+// not, by `moving.wgsl` or `still.wgsl`.
 
 @group(0) @binding(1) var<storage, read> nodes: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> spheres: array<vec4<f32>>;
@@ -17,7 +18,7 @@ const DARK: f32 = 1.0 / 4096.0;
 // Rounding of the box test, relative to the distances in it
 const SLAB_SLACK: f32 = 1e-6;
 
-struct Ray { origin: vec3<f32>, direction: vec3<f32> }
+struct Ray { origin: vec3<f32>, direction: vec3<f32>, time: f32 }
 
 // Distance, slot in `spheres`, and index of the sphere
 struct Hit { t: f32, slot: u32, index: u32 }
@@ -48,11 +49,11 @@ fn index_of(slot: u32) -> u32 {
 // intersection", 2019).
 fn distance_to(sphere: vec4<f32>, ray: Ray) -> f32 {
   let to_center = sphere.xyz - ray.origin;
-  let middle = dot_fused(to_center, ray.direction);
-  let across = minus_fused(to_center, middle, ray.direction);
+  let middle = test_dot(to_center, ray.direction);
+  let across = test_minus(to_center, middle, ray.direction);
   let radius = radius_of(sphere);
   // A plain product could be fused with the subtraction
-  let discriminant = mul(radius, radius) - dot_fused(across, across);
+  let discriminant = mul(radius, radius) - test_dot(across, across);
   if (!(discriminant >= 0.0)) { return -1.0; }
   let half = root(discriminant);
   let near = middle - half;
@@ -141,7 +142,7 @@ fn nearest_behind(last: Hit, ray: Ray, limit: f32) -> Hit {
     if (level == 0u) {
       for (var j = 0u; j < BLOCK; j++) {
         let slot = index * BLOCK + j;
-        let t = distance_to(spheres[slot], ray);
+        let t = distance_to(sphere_at(slot, ray.time), ray);
         if (t >= 0.0 && t <= hit.t) {
           let found = index_of(slot);
           let is_passed = t < last.t || (t == last.t && found <= last.index);
@@ -218,7 +219,7 @@ fn transmittance(ray: Ray, limit: f32) -> f32 {
     if (level == 0u) {
       for (var j = 0u; j < BLOCK; j++) {
         let slot = index * BLOCK + j;
-        let t = distance_to(spheres[slot], ray);
+        let t = distance_to(sphere_at(slot, ray.time), ray);
         if (!(t >= 0.0 && t < limit)) { continue; }
         if (!HAS_OPACITY) { return 0.0; }
         product *= 1.0 - opacity_of(index_of(slot));

@@ -16,11 +16,16 @@ struct Light {
   half: vec2<f32>, zeros: vec2<f32>,
 }
 
-struct View {
+// Where a camera is, its axes, half the width and height of the film, and whether rays are parallel
+struct CameraAt {
   eye: vec3<f32>, zero: f32,
   right: vec3<f32>, half_width: f32,
   up: vec3<f32>, half_height: f32,
   forward: vec3<f32>, is_parallel: u32,
+}
+
+struct View {
+  camera: CameraAt,
   // Size in pixels of the camera's image
   size: vec2<f32>,
   // Position in it of the first pixel of the film
@@ -44,8 +49,11 @@ struct View {
   ambient: vec3<f32>, diffuse: f32,
   color: vec3<f32>, specular: f32,
   shininess: f32, reflection: f32, ior: f32, is_exact_fresnel: u32,
+  // The camera when the shutter opens and when it closes
+  open: CameraAt,
+  close: CameraAt,
   lights: array<Light, 8>,
 }
 @group(0) @binding(0) var<uniform> view: View;
 
-fn zero() -> f32 { return view.zero; }
+fn zero() -> f32 { return view.camera.zero; }

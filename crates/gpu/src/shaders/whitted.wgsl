@@ -124,7 +124,8 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
   if (is_ray) {
     if (current.sample == 0u) { clear_pixel(pixel); }
     on_film = film_position(id.x, id.y, current.sample);
-    ray = camera_ray(on_film);
+    ray = camera_ray(on_film, time_of(pixel));
+    on_film = seen_on_film(on_film, ray.time);
     hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
   }
   follow(is_ray, ray, 1.0, pixel, hit, on_film);
@@ -146,9 +147,9 @@ fn trace_next(
   if (is_ray) {
     let origin = rays[RAY * i];
     let direction = rays[RAY * i + 1u];
-    ray = Ray(origin.xyz, direction.xyz);
     throughput = direction.w;
     pixel = bitcast<u32>(origin.w);
+    ray = Ray(origin.xyz, direction.xyz, time_of(pixel));
     hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
   }
   follow(is_ray, ray, throughput, pixel, hit, vec2<f32>(0.0));
@@ -166,8 +167,9 @@ fn trace_shadow(
   let place = i + first_shadow(stage.source);
   let start = shadows[SHADOW * place];
   let into = toward(view.lights[stage.source], start.xyz);
-  let passing = transmittance(Ray(start.xyz, into.xyz), into.w);
+  let pixel = bitcast<u32>(start.w);
+  let passing = transmittance(Ray(start.xyz, into.xyz, time_of(pixel)), into.w);
   if (passing > 0.0) {
-    add_to_film(bitcast<u32>(start.w), vec4<f32>(passing * shadows[SHADOW * place + 1u].xyz, 0.0));
+    add_to_film(pixel, vec4<f32>(passing * shadows[SHADOW * place + 1u].xyz, 0.0));
   }
 }
