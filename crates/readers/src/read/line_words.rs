@@ -27,6 +27,17 @@ impl<'a> LineWords<'a> {
         word
     }
 
+    /// As [`Self::next`], where quotes may stand around a word with blanks. They are not part of it.
+    pub(super) fn next_quoted(&mut self) -> &'a [u8] {
+        let quoted = self.rest().strip_prefix(b"\"");
+        let end = quoted.and_then(|rest| rest.iter().position(|&byte| byte == b'"'));
+        let Some((rest, end)) = quoted.zip(end) else {
+            return self.next();
+        };
+        self.rest = &rest[end + 1..];
+        &rest[..end]
+    }
+
     /// What follows, without blanks around it.
     pub(super) const fn rest(&self) -> &'a [u8] {
         self.rest.trim_ascii()

@@ -22,6 +22,8 @@ struct Sdf;
 /// Lines before the counts.
 const HEADING: usize = 3;
 const RECORD_END: &[u8] = b"$$$$";
+/// Where the third coordinate of an atom of V2000 ends.
+const Z_END: usize = 30;
 /// What lines of V3000 begin with.
 const V3000: &[u8] = b"M  V30 ";
 /// Longest line of V3000 that is continued, bytes.
@@ -132,9 +134,13 @@ fn read_columns(
     let mut table = AtomTable::new(&[ELEMENT], &[], &[], budget);
     for _ in 0..atom_count {
         let line = next_line(text, "line of an atom")?;
-        let axis = |start| coordinate(line, start, start + 10);
-        let position = [axis(0)?, axis(10)?, axis(20)?];
-        table.push(position, &[element(field(line.text, 31, 34))], &[], &[])?;
+        // Programs write long numbers in more than ten columns, and so move what follows
+        let more = line.text.iter().skip(Z_END).take_while(|byte| byte.is_ascii_digit()).count();
+        let z_end = Z_END + more;
+        let position =
+            [coordinate(line, 0, 10)?, coordinate(line, 10, 20)?, coordinate(line, 20, z_end)?];
+        let symbol = field(line.text, z_end + 1, z_end + 4);
+        table.push(position, &[element(symbol)], &[], &[])?;
     }
     let particles = table.into_particles();
     let left = budget.less(particles.byte_len());
@@ -174,7 +180,7 @@ fn read_words(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<RawParti
             (number, Block::Atoms) => {
                 let number = text::integer(number)
                     .ok_or_else(|| words.unexpected(number, "the number of an atom"))?;
-                let symbol = words.next();
+                let symbol = words.next_quoted();
                 table.push(words.vector("a coordinate")?, &[element(symbol)], &[], &[])?;
                 numbers.push(number, budget)?;
                 found += 1;
@@ -301,6 +307,20 @@ mod tests {
         assert_eq!(READER.one(NEW.as_bytes()).positions.len(), 3);
         let empty = "\n\n\n  0  0  0     0  0            999 V2000\nM  END\n";
         assert_eq!(READER.one(empty.as_bytes()).positions.len(), 0);
+    }
+
+    #[test]
+    fn symbols_may_be_quoted_and_coordinates_long() {
+        let query = NEW.replace("2 O 1", "2 \"NOT [O, N]\" 1");
+        let found = READER.one(query.as_bytes());
+        assert_eq!(coordinates(&found.positions)[1], [1.0, 2.0, 3.0]);
+        assert!(numbers(&attribute(&found, "element").data)[1] > 118.0);
+        for (number, z) in [("-15355.5894", -15355.5894), ("123456.1234", 123_456.123_4)] {
+            let found =
+                READER.one(OLD.replacen("    3.0000 C", &format!("{number} C"), 1).as_bytes());
+            assert_eq!(coordinates(&found.positions)[0], [0.5, -1.25, z]);
+            assert_eq!(numbers(&attribute(&found, "element").data), [6.0, 8.0, 1.0]);
+        }
     }
 
     #[test]
