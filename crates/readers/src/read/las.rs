@@ -17,6 +17,7 @@ use spherule_frame::{
     Attribute, AttributeData, Endian, ParseError, Positions, RawParticles, ScalarType,
 };
 
+mod layered_times;
 mod laz;
 mod times;
 
@@ -102,9 +103,6 @@ impl Reader for Las {
         let name = if header.is_compressed { "LAZ" } else { "LAS" };
         let mut notes =
             vec![format!("{name} 1.{}, format of points {}", header.minor, header.format)];
-        if header.lacks_times() {
-            notes.push("times of compressed points (gps_time) are not read".to_owned());
-        }
         let (_, left_out) = header.extra_columns(bytes);
         if !left_out.is_empty() {
             let names = left_out.join(", ");
@@ -204,11 +202,6 @@ impl LasHeader {
         Ok(Positions::F64(triples.iter().map(position).collect()))
     }
 
-    /// Whether its times are compressed in a way that is not read.
-    const fn lacks_times(&self) -> bool {
-        self.is_compressed && self.format > 5
-    }
-
     /// The columns beside the coordinates of points that are there.
     fn attributes(&self, bytes: &[u8]) -> Vec<StridedColumn> {
         let (_, class, source, time, color, infrared) = offsets(self.format).unwrap_or_default();
@@ -222,10 +215,8 @@ impl LasHeader {
             ("color", self.color_type(bytes, color), 3, color),
             ("nir", ScalarType::U16, 1, infrared),
         ];
-        let is_there =
-            |name: &str, offset| offset > 0 && !(self.lacks_times() && name == "gps_time");
         for (name, scalar, components, offset) in
-            optional.into_iter().filter(|column| is_there(column.0, column.3))
+            optional.into_iter().filter(|(.., offset)| *offset > 0)
         {
             let mut column = self.column(name, scalar, components, offset);
             if name == "color" {

@@ -1,7 +1,8 @@
-//! Times of points in LAZ files of formats up to 5, as LASzip compresses them.
+//! Times of points in LAZ files, as LASzip compresses them: versions 1 and 2 for formats up to 5, layers for others.
 //!
 //! A time is the one before it and a difference, which is a small multiple of the difference before. Version 2 has four
-//! sequences of times, between which the file switches. The crate `laz` follows switches by recursion, as deep as a file
+//! sequences of times, between which the file switches. Layers are like version 2, but have no symbols for times that are
+//! the same as before. The crate `laz` follows switches by recursion, as deep as a file
 //! wants; here their number is limited.
 
 use std::io::{Error, ErrorKind, Read, Result};
@@ -12,11 +13,18 @@ use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
 use laz::record::FieldDecompressor;
 
 /// Bytes of a time.
-const LEN: usize = 8;
+pub(super) const LEN: usize = 8;
 /// A difference is replaced after so many multiples in a row that are far from 1.
 const MANY: u8 = 3;
 /// Sequences of version 2. More switches than these in a row lead nowhere new.
 const SEQUENCES: usize = 4;
+
+/// Symbols of version 2 where the last difference was zero, and where it was not.
+const NONE_SYMBOLS: u32 = 6;
+const STEP_SYMBOLS: u32 = 516;
+/// The symbols of version 2 for the same time as before, which layers do not have.
+const NONE_SAME: u32 = 0;
+const STEP_SAME: u32 = 511;
 
 /// A sequence of times.
 #[derive(Debug, Clone, Copy, Default)]
@@ -61,11 +69,11 @@ impl Sequence {
     }
 }
 
-fn model(symbols: u32) -> ArithmeticModel {
+pub(super) fn model(symbols: u32) -> ArithmeticModel {
     ArithmeticModelBuilder::new(symbols).build()
 }
 
-fn differences(kinds: u32) -> IntegerDecompressor {
+pub(super) fn differences(kinds: u32) -> IntegerDecompressor {
     IntegerDecompressorBuilder::new().bits(32).contexts(kinds).build_initialized()
 }
 
@@ -138,8 +146,9 @@ impl<R: Read> FieldDecompressor<R> for Times1 {
     }
 }
 
-/// Times of version 2.
+/// Times of version 2, and of layers.
 pub(super) struct Times2 {
+    is_layered: bool,
     sequences: [Sequence; SEQUENCES],
     /// The sequence of the last time.
     current: usize,
@@ -153,11 +162,12 @@ pub(super) struct Times2 {
 impl Default for Times2 {
     fn default() -> Self {
         Self {
+            is_layered: false,
             sequences: [Sequence::default(); SEQUENCES],
             current: 0,
             newest: 0,
-            after_none: model(6),
-            after_step: model(516),
+            after_none: model(NONE_SYMBOLS),
+            after_step: model(STEP_SYMBOLS),
             differences: differences(9),
         }
     }
@@ -174,13 +184,50 @@ enum Next {
 }
 
 impl Times2 {
+    /// Times of a layer, whose first one has these bits.
+    pub(super) fn layered(first: i64) -> Self {
+        let mut times = Self {
+            is_layered: true,
+            after_none: model(NONE_SYMBOLS - 1),
+            after_step: model(STEP_SYMBOLS - 1),
+            ..Self::default()
+        };
+        times.sequences[0].last = first;
+        times
+    }
+
+    /// Decodes the bits of the next time.
+    pub(super) fn next_time<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<i64> {
+        for _ in 0..=SEQUENCES {
+            match self.step(decoder)? {
+                Next::Time => {}
+                Next::Switch(further) => {
+                    self.current = (self.current + further) % SEQUENCES;
+                    continue;
+                }
+                Next::New => {
+                    let before = (self.sequences[self.current].last >> 32) as i32;
+                    let upper = self.differences.decompress(decoder, before, 8)?;
+                    let last = i64::from(upper) << 32 | i64::from(decoder.read_int()?);
+                    self.newest = (self.newest + 1) % SEQUENCES;
+                    self.current = self.newest;
+                    self.sequences[self.current] = Sequence { last, step: 0, extremes: 0 };
+                }
+            }
+            return Ok(self.sequences[self.current].last);
+        }
+        Err(Error::new(ErrorKind::InvalidData, "times switch between sequences without end"))
+    }
+
     /// Decodes a symbol for the current sequence, and its time unless it begins a sequence.
     fn step<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<Next> {
         let Self { sequences, current, after_none, after_step, differences, .. } = self;
+        let as_version_2 =
+            |symbol: u32, same: u32| symbol + u32::from(self.is_layered && symbol >= same);
         let sequence = &mut sequences[*current];
         if sequence.step == 0 {
-            return Ok(match decoder.decode_symbol(after_none)? {
-                0 => Next::Time,
+            return Ok(match as_version_2(decoder.decode_symbol(after_none)?, NONE_SAME) {
+                NONE_SAME => Next::Time,
                 1 => {
                     sequence.step = differences.decompress(decoder, 0, 0)?;
                     sequence.extremes = 0;
@@ -191,7 +238,7 @@ impl Times2 {
                 symbol => Next::Switch(symbol as usize - 2),
             });
         }
-        let symbol = decoder.decode_symbol(after_step)?;
+        let symbol = as_version_2(decoder.decode_symbol(after_step)?, STEP_SAME);
         let mut near = |factor: i32, kind: u32| {
             differences.decompress(decoder, sequence.multiple(factor), kind)
         };
@@ -222,7 +269,7 @@ impl Times2 {
                 let difference = near(-10, 6)?;
                 sequence.add_extreme(difference);
             }
-            511 => {}
+            STEP_SAME => {}
             512 => return Ok(Next::New),
             _ => return Ok(Next::Switch(symbol as usize - 512)),
         }
@@ -240,26 +287,8 @@ impl<R: Read> FieldDecompressor<R> for Times2 {
     }
 
     fn decompress_with(&mut self, decoder: &mut ArithmeticDecoder<R>, to: &mut [u8]) -> Result<()> {
-        for _ in 0..=SEQUENCES {
-            match self.step(decoder)? {
-                Next::Time => {}
-                Next::Switch(further) => {
-                    self.current = (self.current + further) % SEQUENCES;
-                    continue;
-                }
-                Next::New => {
-                    let before = (self.sequences[self.current].last >> 32) as i32;
-                    let upper = self.differences.decompress(decoder, before, 8)?;
-                    let last = i64::from(upper) << 32 | i64::from(decoder.read_int()?);
-                    self.newest = (self.newest + 1) % SEQUENCES;
-                    self.current = self.newest;
-                    self.sequences[self.current] = Sequence { last, step: 0, extremes: 0 };
-                }
-            }
-            self.sequences[self.current].store(to);
-            return Ok(());
-        }
-        Err(Error::new(ErrorKind::InvalidData, "times switch between sequences without end"))
+        to.copy_from_slice(&self.next_time(decoder)?.to_le_bytes());
+        Ok(())
     }
 }
 
