@@ -1,8 +1,8 @@
 //! MDL files: molecules with their bonds, one (`.mol`) or many (`.sdf`), versions V2000 and V3000.
 //!
 //! Three lines of a heading, a line of counts, then atoms and bonds: in columns of equal width (V2000), or as words in
-//! lines that begin with `M  V30` (V3000). Each record ends with `$$$$` and is a frame. After "CTfile Formats"
-//! (BIOVIA, 2020). Lengths are A.
+//! lines that begin with `M  V30` (V3000). Old files state no version and are as V2000. Each record ends with `$$$$` and
+//! is a frame. After "CTfile Formats" (BIOVIA, 2020). Lengths are A.
 
 use super::atoms::{self, AtomTable, ELEMENT, coordinate, field};
 use super::input::TextInput;
@@ -36,8 +36,11 @@ impl Reader for Sdf {
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         let counts = Lines::new(head, 0..head.len()).nth(HEADING);
-        let is_counts = counts.is_some_and(|line| version(line).is_some());
-        Ok(Confidence::signature_if(is_counts && is_text(head)))
+        Ok(match counts.and_then(version).filter(|_| is_text(head)) {
+            None => Confidence::No,
+            Some(Version::Unstated) => Confidence::IfNamed,
+            Some(Version::V2000 | Version::V3000) => Confidence::Signature,
+        })
     }
 
     fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
@@ -73,7 +76,7 @@ impl Reader for Sdf {
         text.pass_lines(HEADING);
         let line = next_line(text, "line of counts")?;
         match version(line) {
-            Some(Version::V2000) => {
+            Some(Version::V2000 | Version::Unstated) => {
                 let counts = [count(line, 0)?, count(line, 3)?];
                 read_columns(text, counts, budget)
             }
@@ -96,15 +99,22 @@ impl Reader for Sdf {
 enum Version {
     V2000,
     V3000,
+    /// As [`Self::V2000`], in files that are older than the numbers of versions.
+    Unstated,
 }
 
 /// The version at the end of a line of counts.
 fn version(line: Line<'_>) -> Option<Version> {
-    let line = line.text.trim_ascii_end();
-    if line.ends_with(b"V2000") {
+    let text = line.text.trim_ascii_end();
+    if text.ends_with(b"V2000") {
         Some(Version::V2000)
+    } else if text.ends_with(b"V3000") {
+        Some(Version::V3000)
     } else {
-        line.ends_with(b"V3000").then_some(Version::V3000)
+        let has_numbers_alone = text.iter().all(|byte| byte.is_ascii_digit() || *byte == b' ');
+        // V3000 has zeros here, so that a line of zeros has lost its version
+        let has_counts = count(line, 0).is_ok_and(|count| count > 0) && count(line, 3).is_ok();
+        (has_numbers_alone && has_counts).then_some(Version::Unstated)
     }
 }
 
@@ -320,6 +330,15 @@ mod tests {
                 READER.one(OLD.replacen("    3.0000 C", &format!("{number} C"), 1).as_bytes());
             assert_eq!(coordinates(&found.positions)[0], [0.5, -1.25, z]);
             assert_eq!(numbers(&attribute(&found, "element").data), [6.0, 8.0, 1.0]);
+        }
+    }
+
+    #[test]
+    fn old_files_state_no_version() {
+        for counts in ["  3  2\n", "  3  2  0  0  0  0  0  0  0  0  1 \r\n"] {
+            let old = OLD.replace("  3  2  0  0  0  0  0  0  0  0999 V2000\n", counts);
+            assert_eq!(FORMAT.reader().sniff(old.as_bytes()), Ok(Confidence::IfNamed));
+            assert_eq!(READER.one(old.as_bytes()), READER.one(OLD.as_bytes()));
         }
     }
 
