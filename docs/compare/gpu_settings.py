@@ -2,8 +2,8 @@
 
     python3 gpu_settings.py [PROGRAM [GPU [PARTICLES [SIZE]]]]
 
-PROGRAM is `spherule` built with the feature `gpu`. Prints, for each combination, the largest mean of the differences of a
-component of colours or of a part of the light, relative to the mean colour, and which other channels differ. Fails if one
+PROGRAM is `spherule` built with the feature `gpu`. Prints, for each combination, the mean of the differences of colours
+or of a part of the light, whichever is larger, relative to the mean colour, and which other channels differ. Fails if one
 differs by more than 1e-3, or coverage, ids or Cryptomatte at all. Compilers of drivers may fail in one variant of the kernels alone, so all are tried.
 """
 
@@ -81,11 +81,16 @@ def main():
             file = water if title == BLUR else box
             both = [picture(file, device, ["--set", channels] + options) for device in ("cpu", "gpu")]
             # Of the colours, and of each part of the light
-            parts = [name for name in both[0] if name[-2:] in (".R", ".G", ".B") or name == "shadow"]
+            layers = {"RGB": ["R", "G", "B"], "shadow": ["shadow"]}
+            for name in both[0]:
+                layer, _, component = name.rpartition(".")
+                if component in ("R", "G", "B") and layer and not layer.startswith("crypto"):
+                    layers.setdefault(layer, []).append(name)
             size = max(np.mean([np.abs(both[0][name].astype("f8")).mean() for name in "RGB"]), 1e-9)
-            errors = [np.abs(both[0][name].astype("f8") - both[1][name]).mean() / size for name in ["R", "G", "B"] + parts]
-            error = max(errors)
-            others = [name for name in both[0] if name not in ["R", "G", "B"] + parts]
+            difference = lambda name: np.abs(both[0][name].astype("f8") - both[1][name]).mean() if name in both[0] else 0
+            error = max(np.mean([difference(name) for name in names]) for names in layers.values()) / size
+            compared = sum(layers.values(), [])
+            others = [name for name in both[0] if name not in compared]
             differ = [name for name in others if both[0][name].tobytes() != both[1][name].tobytes()]
             # The last bits of rays through a lens differ, so that some meet other particles
             exact = ("A",) if title == LENS else ("A", "id", "crypto")
