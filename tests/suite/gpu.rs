@@ -199,15 +199,20 @@ mod on_a_device {
     }
 
     #[test]
-    fn native_frames_are_decoded() {
+    fn native_frames_of_each_encoding_are_decoded() {
         let Some(workshop) = workshop_with_device() else { return };
-        workshop.run(&["convert", "in", "-o", "native"]).expect(0);
-        for (out, options) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
-            let pattern = format!("{out}/f.####.exr");
-            let native = ["render", "native", "-o", pattern.as_str()];
-            workshop.run(&[&native[..], &SMALL, &with(options)].concat()).expect(0);
+        for encoding in ["f32", "q16", "q10"] {
+            let native = format!("native-{encoding}");
+            let encoded = ["convert", "in", "--encoding", encoding, "-o", &native];
+            workshop.run(&encoded).expect(0);
+            let [gpu, cpu] = ["gpu", "cpu"].map(|device| format!("{device}-{encoding}"));
+            for (out, options) in [(&gpu, &DEVICE[..]), (&cpu, &["--device=cpu"])] {
+                let pattern = format!("{out}/f.####.exr");
+                let render = ["render", native.as_str(), "-o", pattern.as_str()];
+                workshop.run(&[&render[..], &SMALL, &with(options)].concat()).expect(0);
+            }
+            assert_equal(&workshop, [&gpu, &cpu]);
         }
-        assert_equal(&workshop, ["gpu", "cpu"]);
     }
 
     #[test]

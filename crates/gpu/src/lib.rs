@@ -91,6 +91,7 @@ mod scene;
 mod scene_lighting;
 mod self_test;
 mod spheres;
+mod stored;
 mod tree;
 
 pub use arithmetic::Arithmetic;
@@ -108,5 +109,5 @@ pub use renderer::{
     largest_array,
 };
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
-pub use spheres::{Centers, KeyLength, Order, Radii, Spheres};
+pub use spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
 pub use tree::{MAX_SPHERES, spheres_within, tree_bytes};

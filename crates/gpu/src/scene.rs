@@ -17,7 +17,7 @@ use spherule_tracer::render::{
 use spherule_tracer::scene::ground::Pattern;
 use spherule_tracer::scene::{self, Falloff, Fresnel, LightKind, Projection, Scene, background};
 use spherule_tree::accel;
-use spherule_tree::blocks::{Block, StoredBlocks, StoredLeaves};
+use spherule_tree::blocks::StoredLeaves;
 
 use crate::lighting::Model;
 use crate::picture::{
@@ -26,6 +26,7 @@ use crate::picture::{
 use crate::renderer::{Colors, Cost, LightLayer, NearestSample, Pixels, Renderer, light_groups_of};
 use crate::scene_lighting::SceneLighting;
 use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
+use crate::stored::{centers_of, grids_of};
 use crate::{Device, GpuError};
 
 /// What the device lacks of the renderer for CPUs.
@@ -187,7 +188,7 @@ impl SceneRenderer {
     }
 
     /// Same as [`Self::prepare`], of the leaves of a native frame, whose particles are in the order of a tree. `radius` is
-    /// that of all particles, if it is the same. Positions of 32 bits are copied as they are.
+    /// that of all particles, if it is the same. Positions are copied as they are stored, and decoded on the device.
     ///
     /// # Errors
     /// Same as [`Self::prepare`].
@@ -197,15 +198,7 @@ impl SceneRenderer {
         radius: Option<f32>,
         source: &dyn ShadeSource,
     ) -> Result<(), GpuError> {
-        let decoded: Vec<Block>;
-        let blocks = match &leaves.blocks {
-            StoredBlocks::F32(blocks) => *blocks,
-            StoredBlocks::Q16(_) | StoredBlocks::Q10(_) => {
-                let all = (0..leaves.block_count()).into_par_iter();
-                decoded = all.map(|index| leaves.block(index)).collect();
-                &decoded[..]
-            }
-        };
+        let grids = grids_of(leaves);
         let load = |block| leaves.radii.load(block).map(|radii| radii.0);
         let each: Vec<f32>;
         let radii = match radius {
@@ -216,9 +209,8 @@ impl SceneRenderer {
                 Radii::PerSphere(&each)
             }
         };
-        let centers = Centers::Blocks { blocks: bytemuck::cast_slice(blocks), count: leaves.count };
         let spheres = Spheres {
-            centers,
+            centers: centers_of(leaves, &grids),
             radii,
             order: Order::AlongCurve,
             displacements: None,

@@ -28,13 +28,43 @@ pub enum Centers<'a> {
         /// Number of centres.
         count: u64,
     },
+    /// In blocks of 16 whose coordinates are integers on a grid.
+    Coded {
+        /// How they are stored.
+        encoding: Encoding,
+        /// The blocks: 16 or 24 words each. Lanes of the last one beyond `count` are not used.
+        words: &'a [u32],
+        /// The grid of each block.
+        grids: &'a [Grid],
+        /// Blocks that are not coded, to which others refer: all x, then all y, then all z.
+        wide: &'a [[f32; 48]],
+        /// Number of centres.
+        count: u64,
+    },
+}
+
+/// The position of code 0, and the step of a grid, on each axis.
+pub type Grid = [f32; 6];
+
+/// How coordinates are stored.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Encoding {
+    /// As numbers, one centre after the other.
+    #[default]
+    Points,
+    /// As numbers, in blocks.
+    Blocks,
+    /// 16 bits for each axis.
+    Q16,
+    /// 11, 11 and 10 bits.
+    Q10,
 }
 
 impl Centers<'_> {
     pub(crate) const fn count(&self) -> u64 {
         match self {
             Self::Points(points) => points.len() as u64,
-            Self::Blocks { count, .. } => *count,
+            Self::Blocks { count, .. } | Self::Coded { count, .. } => *count,
         }
     }
 
@@ -42,6 +72,23 @@ impl Centers<'_> {
         match self {
             Self::Points(points) => bytemuck::cast_slice(points),
             Self::Blocks { blocks, .. } => bytemuck::cast_slice(blocks),
+            Self::Coded { words, .. } => bytemuck::cast_slice(words),
+        }
+    }
+
+    /// The grids, and the blocks that are not coded.
+    pub(crate) const fn coding(&self) -> (&[Grid], &[[f32; 48]]) {
+        match self {
+            Self::Points(_) | Self::Blocks { .. } => (&[], &[]),
+            Self::Coded { grids, wide, .. } => (grids, wide),
+        }
+    }
+
+    pub(crate) const fn encoding(&self) -> Encoding {
+        match self {
+            Self::Points(_) => Encoding::Points,
+            Self::Blocks { .. } => Encoding::Blocks,
+            Self::Coded { encoding, .. } => *encoding,
         }
     }
 }

@@ -10,7 +10,7 @@ use wgpu::BindingResource;
 
 use crate::arrays::{Array, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel, Timer};
-use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
+use crate::spheres::{Encoding, KeyLength, Order, Radii, Spheres};
 use crate::{Device, GpuError};
 
 /// Spheres in a block, the constant `BLOCK` of the shaders.
@@ -50,8 +50,10 @@ pub(crate) struct TreeShape {
     keeps_copies: bool,
     /// Number of spheres.
     pub(crate) count: u64,
-    /// Whether the centres are in blocks.
-    is_in_blocks: bool,
+    /// How the centres are stored.
+    encoding: Encoding,
+    /// Number of blocks that are not coded.
+    wide_count: u64,
 }
 
 /// A uniform of the kernels.
@@ -67,13 +69,14 @@ struct Build {
     first: u32,
     radius: f32,
     keeps_copies: u32,
-    zeros: [u32; 3],
+    wide_count: u32,
+    zeros: [u32; 2],
 }
 
-/// What kernels for keys depend on: the length, and whether centres are in blocks.
-type KeyVariant = (KeyLength, bool);
-/// What kernels for nodes depend on: whether radii are equal, whether centres are in blocks, and whether spheres move.
-type NodeVariant = (bool, bool, bool);
+/// What kernels for keys depend on: the length, and how centres are stored. Only centres in any order have keys.
+type KeyVariant = (KeyLength, Encoding);
+/// What kernels for nodes depend on: whether radii are equal, how centres are stored, and whether spheres move.
+type NodeVariant = (bool, Encoding, bool);
 
 /// Kernels for keys of one length.
 #[derive(Debug)]
@@ -86,12 +89,10 @@ struct KeyKernels {
 }
 
 impl KeyKernels {
-    fn new(device: &Device, (length, is_in_blocks): KeyVariant) -> Self {
-        let bits = format!(
-            "const BITS: u32 = {}u;\nconst IN_BLOCKS: bool = {is_in_blocks};\n",
-            8 * length.words()
-        );
-        let source = [&bits, BUILD, GROUPS, CENTERS, include_str!("shaders/keys.wgsl")];
+    fn new(device: &Device, (length, encoding): KeyVariant) -> Self {
+        let bits = format!("const BITS: u32 = {}u;\n", 8 * length.words());
+        let encoding = encoding_constant(encoding);
+        let source = [&bits, &encoding, BUILD, GROUPS, CENTERS, include_str!("shaders/keys.wgsl")];
         let module = device.module(&source.concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
@@ -133,19 +134,33 @@ struct NodeKernels {
 }
 
 impl NodeKernels {
-    fn new(device: &Device, (is_common, is_in_blocks, has_motion): NodeVariant) -> Self {
-        let in_blocks = format!(
-            "const IN_BLOCKS: bool = {is_in_blocks};\nconst HAS_MOTION: bool = {has_motion};\n"
-        );
-        let constants = tree_constants(is_common);
-        let kernels = include_str!("shaders/nodes.wgsl");
-        let source = [&constants, &in_blocks, BUILD, GROUPS, CENTERS, kernels];
+    fn new(device: &Device, (is_common, encoding, has_motion): NodeVariant) -> Self {
+        let is_coded = matches!(encoding, Encoding::Q16 | Encoding::Q10);
+        let motion = format!("const HAS_MOTION: bool = {has_motion};\n");
+        let centers = if is_coded {
+            [device.arithmetic().source(), ARITHMETIC, include_str!("shaders/coded_centers.wgsl")]
+                .concat()
+        } else {
+            CENTERS.to_owned()
+        };
+        let source = [
+            &tree_constants(is_common),
+            &motion,
+            &encoding_constant(encoding),
+            BUILD,
+            GROUPS,
+            &centers,
+            include_str!("shaders/nodes.wgsl"),
+        ];
         let module = device.module(&source.concat());
-        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
+        let of_centers: &[u32] = if is_coded { &[15, 16] } else { &[] };
+        let kernel = |entry, bindings: &[u32]| {
+            Kernel::new(device, &module, entry, &[bindings, of_centers].concat())
+        };
         Self {
             gather_spheres: kernel("gather_spheres", &[0, 1, 3, 7, 8, 9, 13, 14]),
             block_boxes: kernel("block_boxes", &[0, 1, 3, 7, 8, 11, 14]),
-            build_level: kernel("build_level", &[0, 10, 11, 12]),
+            build_level: Kernel::new(device, &module, "build_level", &[0, 10, 11, 12]),
         }
     }
 }
@@ -154,6 +169,17 @@ impl NodeKernels {
 const BUILD: &str = include_str!("shaders/build.wgsl");
 const CENTERS: &str = include_str!("shaders/centers.wgsl");
 pub(crate) const GROUPS: &str = include_str!("shaders/groups.wgsl");
+const ARITHMETIC: &str = include_str!("shaders/arithmetic.wgsl");
+
+fn encoding_constant(encoding: Encoding) -> String {
+    let number = match encoding {
+        Encoding::Points => 0,
+        Encoding::Blocks => 1,
+        Encoding::Q16 => 2,
+        Encoding::Q10 => 3,
+    };
+    format!("const ENCODING: u32 = {number}u;\n")
+}
 
 /// Constants of the shaders that read spheres.
 pub(crate) fn tree_constants(is_common: bool) -> String {
@@ -187,10 +213,12 @@ struct TreeArrays {
     nodes: Array,
     displacements: Array,
     moves: Array,
+    grids: Array,
+    wide: Array,
 }
 
 impl TreeArrays {
-    fn all(&self) -> [&Array; 14] {
+    fn all(&self) -> [&Array; 16] {
         let [first, second] = &self.pairs;
         let [boxes, other_boxes] = &self.boxes;
         [
@@ -208,6 +236,8 @@ impl TreeArrays {
             &self.nodes,
             &self.displacements,
             &self.moves,
+            &self.grids,
+            &self.wide,
         ]
     }
 }
@@ -257,7 +287,7 @@ impl TreeBuilder {
     /// If there are more than the device holds, or if the device fails.
     ///
     /// # Panics
-    /// If there are fewer radii than centres.
+    /// If there are fewer radii than centres, or if keys are needed for coded centres.
     pub(crate) fn build(
         &mut self,
         device: &Device,
@@ -278,12 +308,11 @@ impl TreeBuilder {
     /// If the device fails.
     pub(crate) fn start(&mut self, device: &Device, timer: Option<&Timer>) -> Result<(), GpuError> {
         let shape = self.shape;
-        let length = match self.order {
-            Order::Any(length) => length,
-            Order::AlongCurve => KeyLength::Short,
+        let (length, keyed) = match self.order {
+            Order::Any(length) => (length, shape.encoding),
+            Order::AlongCurve => (KeyLength::Short, Encoding::Points),
         };
-        let variants =
-            ((length, shape.is_in_blocks), (shape.is_common, shape.is_in_blocks, shape.has_motion));
+        let variants = ((length, keyed), (shape.is_common, shape.encoding, shape.has_motion));
         self.keys.entry(variants.0).or_insert_with(|| KeyKernels::new(device, variants.0));
         self.nodes.entry(variants.1).or_insert_with(|| NodeKernels::new(device, variants.1));
         // Record and start all stages
@@ -343,6 +372,9 @@ impl TreeBuilder {
         let moves = if spheres.displacements.is_some() { 16 * blocks * BLOCK } else { 0 };
         arrays.moves.reserve(device, "motion of particles", moves)?;
         // Copy what they read
+        let (grids, wide) = spheres.centers.coding();
+        arrays.grids.write(device, "grids of positions", bytemuck::cast_slice(grids))?;
+        arrays.wide.write(device, "positions", bytemuck::cast_slice(wide))?;
         let displacements = spheres.displacements.unwrap_or_default();
         let bytes = bytemuck::cast_slice(displacements);
         arrays.displacements.write(device, "motion of particles", bytes)?;
@@ -410,6 +442,7 @@ impl TreeBuilder {
             children: narrow(blocks),
             radius: shape.radius,
             keeps_copies: shape.keeps_copies.into(),
+            wide_count: narrow(shape.wide_count),
             ..Build::default()
         };
         step(Kind::GatherSpheres, side, build, blocks * BLOCK, 256);
@@ -457,6 +490,8 @@ impl TreeBuilder {
             11 => &arrays.boxes[1 - step.side],
             13 => &arrays.displacements,
             14 => &arrays.moves,
+            15 => &arrays.grids,
+            16 => &arrays.wide,
             _ => &arrays.nodes,
         };
         array.binding()
@@ -518,12 +553,13 @@ fn shape_of(spheres: &Spheres<'_>) -> Result<TreeShape, GpuError> {
         let (bytes, max) = (BYTES_OF_SPHERE * count, BYTES_OF_SPHERE * MAX_SPHERES);
         return Err(GpuError::TooLarge { what: "particles", bytes, max });
     }
-    let is_in_blocks = matches!(spheres.centers, Centers::Blocks { .. });
+    let encoding = spheres.centers.encoding();
+    let wide_count = spheres.centers.coding().1.len() as u64;
     let has_motion = spheres.displacements.is_some();
     // Spheres with the same centre may move in different directions
     let keeps_copies = spheres.keeps_copies || has_motion;
     let mut shape =
-        TreeShape { count, is_in_blocks, has_motion, keeps_copies, ..TreeShape::default() };
+        TreeShape { count, encoding, wide_count, has_motion, keeps_copies, ..TreeShape::default() };
     (shape.radius, shape.is_common) = match spheres.radii {
         Radii::Common(radius) => (radius, true),
         Radii::PerSphere(_) => (0.0, false),

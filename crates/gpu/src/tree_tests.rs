@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::Checks;
+use crate::spheres::Centers;
 
 /// Even points and four at each of many places, from a fixed sequence.
 fn points(count: u32) -> Vec<[f32; 3]> {
