@@ -1,6 +1,10 @@
 //! Converts bytes to particles and back: readers for the formats of simulations, the native frame file, and the
 //! sequences of files that make animations.
 //!
+//! ```text
+//! files -> compression, readers, hdf5, native frames -> [formats] -> Sequence -> frames: ParticleFrame
+//! ```
+//!
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins
 //! them. Arrows never point the other way.

@@ -1,6 +1,10 @@
 //! Plans, records and resumes frame-by-frame work. The crate does not know what the work is: the caller passes
 //! frames and the settings that outputs depend on, and does the work itself.
 //!
+//! ```text
+//! a plan -> [jobs] -> tasks for workers, a ledger of what is done -> report
+//! ```
+//!
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins
 //! them. Arrows never point the other way.

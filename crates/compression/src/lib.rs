@@ -1,5 +1,9 @@
 //! Compressed files: which compression a file has, by its content, and its content without it.
 //!
+//! ```text
+//! file.csv.gz -> [compression] -> bytes of file.csv -> readers, formats
+//! ```
+//!
 //! `decompressor` reads a file from front to back, `member` decodes one stream of it (`lz4`, `scf` with `blosc`, and
 //! `zip` for an archive of one file), `length` estimates the decompressed length, `whole` reads all of a file, and
 //! `regular` detects changes of it. NPZ files are archives of arrays and not compressed in this sense. Which format the

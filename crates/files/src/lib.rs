@@ -1,5 +1,9 @@
 //! What programs need around files, before they know what is in them.
 //!
+//! ```text
+//! compression, readers, formats, images, report, jobs, spherule -> [files] -> the file system
+//! ```
+//!
 //! - [`publish`], [`Publisher`]: files that appear under their name complete or not at all. They are written under a
 //!   temporary name in the same directory, synced and renamed, and the directory is synced. Temporary files are called
 //!   `.NAME.OWNER.N.part`. The owner distinguishes files of killed processes from those that are being written, also

@@ -1,5 +1,9 @@
 //! One time step of a particle simulation in memory, whatever file it comes from.
 //!
+//! ```text
+//! readers, hdf5 -> RawParticles  [frame]  ParticleFrame -> selection, survey, spherule -> tree
+//! ```
+//!
 //! A reader returns [`RawParticles`]: positions in the type of the file, and [`Attribute`]s, which are named arrays with
 //! a number of components per particle. [`ParticleFrame`] is what the renderer needs of it: finite positions in f32,
 //! relative to the origin that a sequence has in common ([`choose_origin`]). A [`SimulationCell`] and [`Bond`]s come

@@ -1,6 +1,10 @@
 //! Renders spheres on a GPU: builds a tree over them in every frame, and traces pictures, with kernels in WGSL through
 //! Vulkan (crate `wgpu`). The same kernels run on software drivers, so that tests need no GPU.
 //!
+//! ```text
+//! slices of positions and radii, a Scene -> [gpu] -> the pixels of tracer's Film
+//! ```
+//!
 //! - [`Device`]: adapters, limits, and the self-test of the arithmetic.
 //! - [`Spheres`]: the order along a Hilbert curve, blocks of eight, levels of nodes.
 //! - [`Renderer`] and [`Picture`]: spheres by Whitted's model, or by path tracing in a [`Lighting`].

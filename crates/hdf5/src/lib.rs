@@ -1,5 +1,9 @@
 //! HDF5 files of particle simulations, through the crate `hdf5-reader`.
 //!
+//! ```text
+//! file.h5 -> formats -> [hdf5] -> RawParticles
+//! ```
+//!
 //! The layout of groups and data sets tells the dialect: `gadget`, `h5md`, `h5part`, `openpmd`, `pysph`, `vtkhdf`, and
 //! `plain` for names alone. A dialect lists the time steps and finds the values of each (`dialect`, `properties`). The values are data
 //! sets, or parts of them (`values`), in one piece or in chunks (`chunks`), which are decoded in parallel. `table`

@@ -1,5 +1,9 @@
 //! Pictures in and out of files.
 //!
+//! ```text
+//! Film of tracer -> [images] -> OpenEXR, PNG, movies, sheets
+//! ```
+//!
 //! - [`file`](mod@file): which format an image file has, and what may be wrong with it.
 //! - [`hdr`]: images as input, in linear values: environments and pictures on the ground.
 //! - [`picture`]: finished pictures as input: rows of 8 bits, planes of OpenEXR, scaling.

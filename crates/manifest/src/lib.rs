@@ -1,5 +1,9 @@
 //! The manifest: all settings of a job with their types and defaults, read from TOML.
 //!
+//! ```text
+//! job.toml, options -> [manifest] -> Manifest -> spherule: a plan with every setting
+//! ```
+//!
 //! Each key is declared once, in the file of its table, with the macros of `keys.rs`. Reading, the commented file of
 //! `spherule init`, the JSON schema ([`job_schema`]), the page of the manual and the options of the command line
 //! ([`key_flags`]) all come from these declarations. Rules between keys are declared with the macro of `rule.rs`, from

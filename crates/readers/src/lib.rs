@@ -1,5 +1,9 @@
 //! Readers of the file formats of particle simulations: bytes to particles.
 //!
+//! ```text
+//! bytes of a file -> [readers] -> RawParticles -> formats: sequences of frames
+//! ```
+//!
 //! - [`read`]: one file or directory for each format, with a constant `FORMAT` each.
 //! - [`Reader`]: the interface that they implement; [`Format`] is a reader as a value.
 //! - [`mesh`]: triangle meshes, for tanks and obstacles.

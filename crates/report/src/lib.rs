@@ -1,5 +1,9 @@
 //! Reports of a run: time and memory of every frame, for people and for scripts, and pages that play its pictures.
 //!
+//! ```text
+//! measurements of frames, ledgers of jobs -> [report] -> report.json, pages, plots
+//! ```
+//!
 //! - [`frame`]: the measurements of one image, in the form of the ledger and of `report.json`.
 //! - [`job`]: the state of a whole job, as `report.json` and, with the feature `pages`, as `report.html`.
 //! - [`machine`]: the machine of a measurement.

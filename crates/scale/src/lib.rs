@@ -1,6 +1,10 @@
 //! The experiment of the thesis (chapter 5) for any number of any particles: builds a tree, traces images from a
 //! moving camera, and measures time and memory.
 //!
+//! ```text
+//! particles -> tree or gpu -> [scale] -> time and memory of each structure -> report
+//! ```
+//!
 //! The unit is a *cell*: one particle count, one structure, one motion, one representation. A [`CellRequest`]
 //! describes a cell, [`cell::measure`] measures it, and [`report`] has its result and the tables, files and pages of
 //! many. A cell measures the memory of its whole process, so callers should run each cell in a separate process, and also

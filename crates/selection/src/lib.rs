@@ -1,5 +1,9 @@
 //! Which particles of a frame are drawn: by a condition on their values, by their ids, and by regions.
 //!
+//! ```text
+//! `type == 2 and z > 0` -> [selection] + frame -> the particles that satisfy it
+//! ```
+//!
 //! - [`Condition`]: a comparison of values such as `speed > 2 && z < 0.5`, parsed from text. Errors name the character.
 //! - [`Region`]: half-spaces, boxes and slabs.
 //! - [`Selection`]: those that must hold for a particle. [`Selection::survivors`] finds the particles of a frame, in

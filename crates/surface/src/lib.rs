@@ -1,5 +1,9 @@
 //! Shapes that rays intersect, from particles to meshes.
 //!
+//! ```text
+//! tree, grids, meshes -> [surface] -> Shape -> tracer
+//! ```
+//!
 //! A scene is a list of [`Shape`]s, which intersect packets of rays. Every [`Intersection`] has a distance, a normal, and
 //! a particle that provides attributes, whatever shape it belongs to. A shape has a [`MaterialId`]. What a material looks
 //! like, and how light travels between shapes, the crate leaves to `spherule-tracer`.

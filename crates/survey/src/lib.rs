@@ -1,5 +1,9 @@
 //! What a sequence of frames contains, from a sample of them: it determines the meaning of "auto", once for all frames.
 //!
+//! ```text
+//! frames of formats -> [survey] -> sizes, ranges, kinds -> spherule: the settings nobody gave
+//! ```
+//!
 //! - [`Survey`]: the origin, the box that the camera frames, the particle radius, the range of the colour map, and how
 //!   much memory a frame needs. A [`Question`] says which of them, and for which particles.
 //! - [`Facts`]: what the particles look like (elements, grains, categories, walls, tanks), from which defaults follow.

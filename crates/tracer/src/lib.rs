@@ -1,5 +1,9 @@
 //! Renders scenes of particles to the planes of a film.
 //!
+//! ```text
+//! shapes of surface, a Scene -> [tracer] -> Film -> images
+//! ```
+//!
 //! - [`scene`]: camera, lights, environment, materials, background, ground: plain values.
 //! - [`render`]: the Whitted and the path integrator, samplers, BSDFs, lights, and the [`render::Film`].
 //! - [`denoise`]: removes noise from a picture and its features.

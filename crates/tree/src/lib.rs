@@ -1,5 +1,9 @@
 //! Acceleration structures over spheres: LBVH, BVH, SBVH and k-d tree, rebuilt for every frame.
 //!
+//! ```text
+//! slices of positions and radii -> [tree] -> Tree -> surface -> tracer
+//! ```
+//!
 //! - [`accel`]: builders, and the one tree that all of them produce: 8-wide nodes of one cache line over blocks of 16
 //!   particles. Single rays and packets of 16 rays traverse it with the instructions of the machine.
 //! - [`blocks`]: the layout of nodes and of blocks of particles in memory and in native frame files.
