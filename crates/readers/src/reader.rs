@@ -137,11 +137,14 @@ pub trait Reader: Sync {
         true
     }
 
-    /// Lists the time steps of a file. A truncated step is listed too, so that reading it gives the error.
+    /// Lists the time steps of a file. A truncated step is listed too, so that reading it gives the error. By default, the
+    /// whole file is one step.
     ///
     /// # Errors
     /// [`ParseError`]; [`ParseError::TooLarge`] if the list needs more memory than the budget of `source` allows.
-    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError>;
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        Ok(vec![Step::whole(source.bytes().len())])
+    }
 
     /// Reads one of the [`Self::steps`]. The budget of `source` limits everything except its bytes.
     ///

@@ -51,10 +51,6 @@ impl Reader for Las {
         Ok(Confidence::signature_if(head.starts_with(MAGIC)))
     }
 
-    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
-        Ok(vec![Step::whole(source.bytes().len())])
-    }
-
     /// Reads the points with intensity, classification, number of the source, time, colour, near infrared, and extra bytes
     /// in numbers.
     fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {

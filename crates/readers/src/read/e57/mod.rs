@@ -50,10 +50,6 @@ impl Reader for E57 {
         Ok(Confidence::signature_if(head.starts_with(MAGIC)))
     }
 
-    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
-        Ok(vec![Step::whole(source.bytes().len())])
-    }
-
     /// Reads the points of all scans. Points that the scanner could not place have no position.
     fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
         let budget = source.budget();

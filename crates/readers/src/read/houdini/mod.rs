@@ -41,10 +41,6 @@ impl Reader for Houdini {
         Ok(Confidence::signature_if(cursor::endian(head).is_some()))
     }
 
-    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
-        Ok(vec![Step::whole(source.bytes().len())])
-    }
-
     /// Reads all points with all their attributes of numbers and strings, under the names of the file.
     ///
     /// Numbers have the type of the file; half precision becomes f32, and strings are indices of their table.
