@@ -114,7 +114,7 @@ fn rough_direction(finish: Finish, base: vec3<f32>, out: vec3<f32>, u: vec2<f32>
 
 fn cosine_direction(u: vec2<f32>) -> vec3<f32> {
   let at = on_disc(u);
-  return vec3<f32>(at, sqrt(max(1.0 - dot(at, at), 0.0)));
+  return vec3<f32>(at, root(max((1.0 - mul(at.x, at.x)) - mul(at.y, at.y), 0.0)));
 }
 
 // The directions of light that leaves and arrives, in the frame of a surface

@@ -43,8 +43,11 @@ fn depth_of(ray: Ray, t: f32) -> f32 {
 // Moves a ray through the centre of the lens to the point of the lens that `u` chooses. It still passes through the same
 // point of the plane in focus.
 fn through_lens(ray: Ray, u: vec2<f32>) -> Ray {
-  let on_lens = on_disc(u) * view.lens_radius;
-  let offset = on_lens.x * view.camera.right + on_lens.y * view.camera.up;
-  let to_focus = (view.lens_focus / dot(ray.direction, view.camera.forward)) * ray.direction - offset;
-  return Ray(ray.origin + offset, normalize(to_focus), ray.time);
+  let camera = view.camera;
+  let at = on_disc(u);
+  let offset = scaled(camera.right, mul(at.x, view.lens_radius)) + scaled(camera.up, mul(at.y, view.lens_radius));
+  let distance = quotient(view.lens_focus, dot_in_order(ray.direction, camera.forward));
+  let to_focus = scaled(ray.direction, distance) - offset;
+  let direction = scaled(to_focus, inverse(root(dot_in_order(to_focus, to_focus))));
+  return Ray(ray.origin + offset, direction, ray.time);
 }

@@ -47,15 +47,17 @@ fn angle_of(y: f32, x: f32) -> f32 {
   return with_sign(angle, y);
 }
 
-// Sine and cosine of an angle of at most a few turns
+// Sine and cosine of an angle of at most a few turns, with the bits of the CPU
 fn sine_cosine(x: f32) -> vec2<f32> {
-  let quadrant = round(x * (2.0 * INVERSE_PI));
-  let r = fma(-quadrant, 7.5497895e-8, fma(-quadrant, 4.837513e-4, fma(-quadrant, 1.5703125, x)));
-  let z = r * r;
-  let s = fma(fma(fma(-1.9515296e-4, z, 8.332161e-3), z, -1.6666655e-1) * z, r, r);
-  let c = fma(fma(fma(2.4433157e-5, z, -1.3887316e-3), z, 4.1666646e-2) * z, z, 1.0 - 0.5 * z);
+  let quadrant = round(mul(x, 2.0 * INVERSE_PI));
+  let r = ((x - mul(quadrant, 1.5703125)) - mul(quadrant, 4.837513e-4)) - mul(quadrant, 7.5497895e-8);
+  let z = mul(r, r);
+  let s = mul(mul(-1.9515296e-4, z) + 8.332161e-3, z) - 1.6666655e-1;
+  let sine = mul(mul(s, z), r) + r;
+  let c = mul(mul(2.4433157e-5, z) - 1.3887316e-3, z) + 4.1666646e-2;
+  let cosine = (mul(mul(c, z), z) - 0.5 * z) + 1.0;
   let quarter = i32(quadrant);
-  let swapped = select(vec2<f32>(s, c), vec2<f32>(c, s), (quarter & 1) == 1);
+  let swapped = select(vec2<f32>(sine, cosine), vec2<f32>(cosine, sine), (quarter & 1) == 1);
   return vec2<f32>(
     select(swapped.x, -swapped.x, (quarter & 2) != 0),
     select(swapped.y, -swapped.y, ((quarter + 1) & 2) != 0),
@@ -70,28 +72,31 @@ struct Tangents { s: vec3<f32>, t: vec3<f32> }
 
 fn tangents_of(n: vec3<f32>) -> Tangents {
   let side = select(1.0, -1.0, n.z < 0.0);
-  let a = -1.0 / (side + n.z);
-  let b = n.x * n.y * a;
+  let a = -inverse(side + n.z);
+  let b = mul(mul(n.x, n.y), a);
   return Tangents(
-    vec3<f32>(1.0 + side * n.x * n.x * a, side * b, -side * n.x),
-    vec3<f32>(b, side + n.y * n.y * a, -n.y),
+    vec3<f32>(1.0 + mul(mul(side * n.x, n.x), a), side * b, -side * n.x),
+    vec3<f32>(b, side + mul(mul(n.y, n.y), a), -n.y),
   );
 }
 
+// The unit vector with these components along the tangents of `n` and `n`, with the bits of the CPU
 fn to_world(along: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
   let frame = tangents_of(n);
-  return normalize(along.x * frame.s + along.y * frame.t + along.z * n);
+  let world = (scaled(frame.s, along.x) + scaled(frame.t, along.y)) + scaled(n, along.z);
+  return scaled(world, inverse(root(dot_in_order(world, world))));
 }
 
-// A point of the unit disc (Shirley and Chiu, "A low distortion map between disk and square", 1997).
+// A point of the unit disc (Shirley and Chiu, "A low distortion map between disk and square", 1997), with the bits of the
+// CPU
 fn on_disc(u: vec2<f32>) -> vec2<f32> {
   let at = 2.0 * u - 1.0;
   let is_steep = abs(at.y) > abs(at.x);
   let radius = select(at.x, at.y, is_steep);
   let other = select(at.y, at.x, is_steep);
-  let angle = QUARTER_PI * select(other / radius, 0.0, radius == 0.0);
+  let angle = mul(QUARTER_PI, select(quotient(other, radius), 0.0, radius == 0.0));
   let turned = sine_cosine(select(angle, HALF_PI - angle, is_steep));
-  return radius * turned.yx;
+  return vec2<f32>(mul(radius, turned.y), mul(radius, turned.x));
 }
 
 // The direction at `u` in a cone around `axis`: `cap` is 1 minus the cosine of half its opening angle.
