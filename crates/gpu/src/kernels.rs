@@ -145,7 +145,7 @@ impl Kernels {
             trace_next: tracing("trace_next", next),
             trace_shadow: tracing("trace_shadow", shadow),
             clamp_indirect: (variant.has_clamp)
-                .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18])),
+                .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18, 21])),
         }
     }
 }

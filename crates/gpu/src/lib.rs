@@ -90,6 +90,7 @@ mod kernels;
 mod lighting;
 mod open;
 mod picture;
+mod pixels;
 mod renderer;
 mod scene;
 mod scene_lighting;
@@ -108,10 +109,8 @@ pub use lighting::{
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-pub use renderer::{
-    Colors, Cost, LightLayer, NearestSample, Pixels, Renderer, SampleObject, bytes_per_pixel,
-    largest_array,
-};
+pub use pixels::{Cost, LightLayer, NearestSample, Pixels, SampleObject};
+pub use renderer::{Colors, Renderer, bytes_per_pixel, largest_array};
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
 pub use tree::{MAX_SPHERES, spheres_within, tree_bytes};

@@ -27,8 +27,7 @@ pub struct Picture<'a> {
     pub has_odd: bool,
     /// Whether the first surface of each sample is kept, for Cryptomatte.
     pub has_objects: bool,
-    /// Number of light groups with that of light without a group, if light is kept by parts; path tracing without a limit
-    /// of indirect light only.
+    /// Number of light groups with that of light without a group, if light is kept by parts; path tracing only.
     pub light_groups: Option<u32>,
     /// The transport of light.
     pub model: Model<'a>,

@@ -23,7 +23,8 @@ use crate::lighting::Model;
 use crate::picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-use crate::renderer::{Colors, Cost, LightLayer, NearestSample, Pixels, Renderer, light_groups_of};
+use crate::pixels::{Cost, LightLayer, NearestSample, Pixels};
+use crate::renderer::{Colors, Renderer, light_groups_of};
 use crate::scene_lighting::SceneLighting;
 use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
 use crate::stored::{centers_of, grids_of};
@@ -46,7 +47,7 @@ pub enum Missing {
     LightExtent,
     /// More lights than [`MAX_LIGHTS`].
     Lights,
-    /// Channels with parts of the light, in Whitted's model or with a limit of indirect light.
+    /// Channels with parts of the light, in Whitted's model.
     Layers,
     /// Outlines and the fading with distance.
     Drawing,
@@ -66,7 +67,7 @@ impl fmt::Display for Missing {
             Self::Panorama => "equirectangular pictures",
             Self::LightExtent => "lights with an extent in Whitted's model",
             Self::Lights => "more than eight lights",
-            Self::Layers => "layers of light with render.clamp, or in Whitted's model",
+            Self::Layers => "layers of light in Whitted's model",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
             Self::Noise => "a limit of noise",
@@ -91,10 +92,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (camera.projection().is_panorama(), Missing::Panorama),
         (scene.lights.iter().any(has_extent) && is_whitted, Missing::LightExtent),
         (scene.lights.len() > MAX_LIGHTS, Missing::Lights),
-        (
-            needs_light_parts(&settings.channels) && (is_whitted || settings.clamp.is_some()),
-            Missing::Layers,
-        ),
+        (needs_light_parts(&settings.channels) && is_whitted, Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
         (settings.noise.is_some(), Missing::Noise),

@@ -88,9 +88,10 @@ fn paths_are_those_of_the_cpu() {
         let case = Case { paths: Some(paths), samples: 5, seed, particles: 400, ..Case::small() };
         let found = support::compare(&mut renderer, &case, level);
         let Difference { ids, depths, normals, positions, mean, bias, odd, ray_ratio, .. } = found;
-        if paths != Paths::Lens {
-            assert_eq!([ids, depths, normals, positions], [0; 4], "{paths:?}");
-        }
+        // Compilers of drivers for CPUs round some of the rays through a lens in another way
+        let most = if paths == Paths::Lens { 30 } else { 0 };
+        let most_of_all = [ids, depths, normals, positions].into_iter().max();
+        assert!(most_of_all <= Some(most), "{paths:?}: {found:?}");
         assert!(mean.max(bias).max(odd) < 1e-3, "{paths:?}: {found:?}");
         assert!((ray_ratio - 1.0).abs() < 1e-3, "{paths:?}: {found:?}");
     }
@@ -176,6 +177,15 @@ fn parts_of_the_light_are_those_of_the_cpu() {
             support::compare(&mut renderer, &Case { has_layers: true, opacity, ..case }, level);
         let Difference { mean, bias, layers: [difference, size], .. } = found;
         assert!(mean.max(bias).max(difference) < 1e-3 && size > 1.0, "{paths:?}: {found:?}");
+    }
+    // With a limit of indirect light, each part loses as much
+    for paths in [Paths::Coats, Paths::Lights] {
+        let clamp = Some(0.1);
+        let case =
+            Case { paths: Some(paths), samples: 5, clamp, has_layers: true, ..Case::small() };
+        let found = support::compare(&mut renderer, &case, level);
+        let Difference { layers: [difference, size], lost: [lost, _], .. } = found;
+        assert!(difference < 1e-3 && size > 1.0 && lost > 1e-3, "{paths:?}: {found:?}");
     }
 }
 

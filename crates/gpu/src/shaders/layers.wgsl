@@ -1,7 +1,8 @@
 // Light by parts (HAS_LAYERS): by its first interaction and by light group, and what arrives of direct light. As the CPU's
 // `light_split.rs` and `light_groups.rs`.
 
-// Sums over the samples of each pixel, plane by plane
+// Sums over the samples of each pixel, plane by plane; then, with a clamp, the parts of the indirect light of the ray that is
+// being traced
 @group(0) @binding(21) var<storage, read_write> layers: array<vec4<f32>>;
 
 // By the first interaction
@@ -25,33 +26,46 @@ fn layer_place(layer: u32, pixel: u32) -> u32 { return layer * view.width * view
 // Empties the layers of a pixel before its first sample.
 fn clear_layers(pixel: u32) {
   if (!HAS_LAYERS) { return; }
-  for (var layer = 0u; layer < view.layer_count; layer++) { layers[layer_place(layer, pixel)] = vec4<f32>(0.0); }
+  let count = select(view.layer_count, 2u * view.layer_count, HAS_CLAMP);
+  for (var layer = 0u; layer < count; layer++) { layers[layer_place(layer, pixel)] = vec4<f32>(0.0); }
 }
 
-fn add_to_layer(layer: u32, pixel: u32, light: vec3<f32>) {
+// Adds light to a layer of a pixel, or, if a clamp limits it, to what is added when the ray is known.
+fn add_to_layer(layer: u32, pixel: u32, light: vec3<f32>, is_limited: bool) {
   if (layer < view.layer_count && any(light != vec3<f32>(0.0))) {
-    layers[layer_place(layer, pixel)] += vec4<f32>(light, 0.0);
+    let target_layer = layer + select(0u, view.layer_count, HAS_CLAMP && is_limited);
+    layers[layer_place(target_layer, pixel)] += vec4<f32>(light, 0.0);
+  }
+}
+
+// Adds a part of the indirect light of a ray to the layers.
+fn add_limited_layers(pixel: u32, part: f32) {
+  if (!HAS_LAYERS) { return; }
+  for (var layer = 0u; layer < view.layer_count; layer++) {
+    let limited = layer_place(view.layer_count + layer, pixel);
+    layers[layer_place(layer, pixel)] += part * layers[limited];
+    layers[limited] = vec4<f32>(0.0);
   }
 }
 
 // Adds light of a group that the first surface reflects, with the diffuse part of that.
-fn add_reflected(pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>) {
+fn add_reflected(pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>, is_limited: bool) {
   if (!HAS_LAYERS) { return; }
-  add_to_layer(BY_DIFFUSE, pixel, diffuse * light);
-  add_to_layer(BY_SPECULAR, pixel, light - diffuse * light);
-  add_to_layer(FIRST_GROUP + group, pixel, light);
+  add_to_layer(BY_DIFFUSE, pixel, diffuse * light, is_limited);
+  add_to_layer(BY_SPECULAR, pixel, light - diffuse * light, is_limited);
+  add_to_layer(FIRST_GROUP + group, pixel, light, is_limited);
 }
 
 // Adds light of a group that a ray sees, not that of a surface. `of_camera`: its layer if that is a camera ray.
 fn add_seen(pixel: u32, of_camera: u32, group: u32, light: vec3<f32>) {
   if (!HAS_LAYERS) { return; }
   if (stage.depth == 1u) {
-    add_to_layer(of_camera, pixel, light);
-    add_to_layer(FIRST_GROUP + group, pixel, light);
+    add_to_layer(of_camera, pixel, light, false);
+    add_to_layer(FIRST_GROUP + group, pixel, light, false);
   } else {
-    add_reflected(pixel, group, light, first_reflection(pixel));
+    add_reflected(pixel, group, light, first_reflection(pixel), stage.depth > 2u);
   }
-  if (stage.depth <= 2u) { add_to_layer(BY_DIRECT, pixel, light); }
+  if (stage.depth <= 2u) { add_to_layer(BY_DIRECT, pixel, light, false); }
 }
 
 fn first_reflection(pixel: u32) -> vec3<f32> { return layers[layer_place(FIRST_REFLECTION, pixel)].xyz; }

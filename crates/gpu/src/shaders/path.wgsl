@@ -219,13 +219,13 @@ fn add_arriving(pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>) {
     add_of_path(pixel, group, light);
     return;
   }
-  add_reflected(pixel, group, light, diffuse);
-  add_to_layer(BY_DIRECT, pixel, light);
+  add_reflected(pixel, group, light, diffuse, false);
+  add_to_layer(BY_DIRECT, pixel, light, false);
 }
 
 // Adds light of a group that later surfaces reflect.
 fn add_of_path(pixel: u32, group: u32, light: vec3<f32>) {
-  if (HAS_LAYERS) { add_reflected(pixel, group, light, first_reflection(pixel)); }
+  if (HAS_LAYERS) { add_reflected(pixel, group, light, first_reflection(pixel), true); }
 }
 
 // The light group of a source of shadow rays from surfaces
@@ -242,7 +242,7 @@ fn add_shadow_parts(pixel: u32, light: vec3<f32>, adds: bool, part: f32, parts: 
     return;
   }
   add_seen(pixel, BY_BACKGROUND, group_behind(), light);
-  if (stage.depth == 1u) { add_to_layer(BY_LOSS, pixel, part * parts.xyz); }
+  if (stage.depth == 1u) { add_to_layer(BY_LOSS, pixel, part * parts.xyz, false); }
   add_arrival(pixel, 0.0, -part * parts.w);
 }
 
@@ -504,4 +504,5 @@ fn clamp_indirect(
     count_lost(light.xyz * (1.0 - part));
   }
   add_to_film(pixel, light * part);
+  add_limited_layers(pixel, part);
 }
