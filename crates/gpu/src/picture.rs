@@ -17,7 +17,7 @@ pub(crate) const FIRST_GROUP: u32 = 8;
 pub struct Picture<'a> {
     /// The camera.
     pub camera: Camera,
-    /// The camera when the shutter opens and when it closes. If the spheres move, else their displacements are missing.
+    /// The camera when the shutter opens and when it closes, if the spheres have displacements.
     pub exposure: Option<[Camera; 2]>,
     /// Size of the film.
     pub film: FilmSize,

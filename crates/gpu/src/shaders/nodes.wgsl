@@ -58,9 +58,9 @@ fn write_box(i: u32, low: vec3<f32>, high: vec3<f32>) {
   }
 }
 
-// Boxes of blocks: of the centres with a common radius, which rays add later, otherwise of the spheres. No ray sees a copy
-// of the sphere before it, which has the lower index, unless spheres move; without this rule, rays would test all opaque particles of a place. The
-// box of a block that has nothing else is empty: its lowest corner is above the highest one.
+// Boxes of blocks: of the centres with a common radius, which rays add later, otherwise of the spheres. Unless spheres move,
+// no ray sees a copy of the sphere before it, which has the lower index; without this rule, rays would test all opaque
+// particles of a place. The box of a block that has nothing else is empty: its lowest corner is above the highest one.
 @compute @workgroup_size(256)
 fn block_boxes(
   @builtin(workgroup_id) group: vec3<u32>,

@@ -4,8 +4,8 @@
 // passes it in a straight line; shadow rays are attenuated by all that they enter. Spheres in which a ray starts do not
 // count then.
 //
-// Files that include this one define `view: View` with the fields used here, and `fn opacity_of(index: u32) -> f32`. Spheres move or
-// not, by `moving.wgsl` or `still.wgsl`.
+// Files that include this one define `view: View` with the fields used here, and `fn opacity_of(index: u32) -> f32`.
+// Spheres move or not, by `moving.wgsl` or `still.wgsl`.
 
 @group(0) @binding(1) var<storage, read> nodes: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> spheres: array<vec4<f32>>;
