@@ -13,4 +13,14 @@ impl Device {
         let arithmetic = self_test::arithmetic_of(&device)?;
         Ok(device.with_arithmetic(arithmetic))
     }
+
+    /// The first device, or None on a machine without one unless `SPHERULE_GPU` requires it.
+    #[cfg(test)]
+    pub(crate) fn for_tests() -> Option<Self> {
+        match Self::open(0, Checks::On) {
+            Ok(device) => Some(device),
+            Err(GpuError::NoAdapter) if std::env::var_os("SPHERULE_GPU").is_none() => None,
+            Err(error) => panic!("{error}"),
+        }
+    }
 }

@@ -54,9 +54,9 @@ mod tests {
     use spherule_tree::blocks::{BLOCK_SIZE, Block, Node, Q10Block, Q16Block, StoredRadii};
 
     use super::*;
+    use crate::Device;
     use crate::spheres::{Order, Radii, Spheres};
     use crate::tree::TreeBuilder;
-    use crate::{Checks, Device, GpuError};
 
     /// Nodes with grids that differ, from a fixed sequence.
     fn nodes(count: usize) -> Vec<Node> {
@@ -116,11 +116,7 @@ mod tests {
 
     #[test]
     fn coded_blocks_are_decoded_to_the_bits_of_the_host() {
-        let device = match Device::open(0, Checks::On) {
-            Ok(device) => device,
-            Err(GpuError::NoAdapter) if std::env::var_os("SPHERULE_GPU").is_none() => return,
-            Err(error) => panic!("{error}"),
-        };
+        let Some(device) = Device::for_tests() else { return };
         let nodes = nodes(4);
         let place = |i: usize| std::array::from_fn(|lane| (100 * i + lane) as f32 / 3.0);
         let wide: Vec<Block> =

@@ -10,7 +10,7 @@ use wgpu::BindingResource;
 
 use crate::arrays::{Array, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel, Timer};
-use crate::spheres::{Encoding, KeyLength, Order, Radii, Spheres};
+use crate::spheres::{Centers, Encoding, KeyLength, Order, Radii, Spheres};
 use crate::{Device, GpuError};
 
 /// Spheres in a block, the constant `BLOCK` of the shaders.
@@ -294,6 +294,8 @@ impl TreeBuilder {
         spheres: &Spheres<'_>,
         timer: Option<&Timer>,
     ) -> Result<(), GpuError> {
+        let is_coded = matches!(spheres.centers, Centers::Coded { .. });
+        assert!(!is_coded || spheres.order == Order::AlongCurve, "coded centres have no keys");
         self.shape = TreeShape::default();
         let shape = shape_of(spheres)?;
         self.upload(device, spheres)?;

@@ -1,8 +1,6 @@
 //! Trees on a device contain their spheres, in an order along a curve.
 
 use super::*;
-use crate::Checks;
-use crate::spheres::Centers;
 
 /// Even points and four at each of many places, from a fixed sequence.
 fn points(count: u32) -> Vec<[f32; 3]> {
@@ -51,17 +49,9 @@ fn built(builder: &mut TreeBuilder, device: &Device, spheres: &Spheres<'_>) -> V
     visible(&builder.content(device).unwrap(), builder.shape())
 }
 
-fn device() -> Option<Device> {
-    match Device::open(0, Checks::On) {
-        Ok(device) => Some(device),
-        Err(GpuError::NoAdapter) if std::env::var_os("SPHERULE_GPU").is_none() => None,
-        Err(error) => panic!("{error}"),
-    }
-}
-
 #[test]
 fn boxes_contain_all_places_once() {
-    let Some(device) = device() else { return };
+    let Some(device) = Device::for_tests() else { return };
     let mut builder = TreeBuilder::new(&device);
     for count in [0, 1, 8, 9, 2047, 2049, 9000] {
         let centers = points(count);
@@ -103,7 +93,7 @@ fn boxes_contain_all_places_once() {
 
 #[test]
 fn neighbours_in_the_order_are_near_each_other() {
-    let Some(device) = device() else { return };
+    let Some(device) = Device::for_tests() else { return };
     let mut builder = TreeBuilder::new(&device);
     let centers = points(8192);
     let distance = |order: &[u32]| {

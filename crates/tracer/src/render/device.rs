@@ -19,7 +19,7 @@ use super::{
     cryptomatte::rank,
     film::{Film, FilmTile, bounded},
     planes::FilmPlane,
-    sample_layers::store,
+    sample_layers::{lit_part, store},
     settings::{RenderError, RenderSettings},
     source::ShadeSource,
 };
@@ -92,7 +92,7 @@ pub trait DevicePixels: Sync {
     /// The light by parts, of opaque scenes. Only if [`needs_light_parts`].
     fn light(&self, number: usize) -> DeviceLight;
 
-    /// The mean light of a group, the first of which is that of light without a group. Only if [`needs_light_parts`].
+    /// The mean light of a light group; group 0 has the light without a group. Only if [`needs_light_parts`].
     fn light_of_group(&self, number: usize, group: u32) -> Vec3;
 }
 
@@ -210,9 +210,7 @@ impl RenderContext<'_> {
         ] {
             store(tile.components_mut(plane, column, row), value);
         }
-        let [whole, arriving] = light.luminance;
-        let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
-        tile.components_mut(FilmPlane::Shadow, column, row).fill(lit.clamp(0.0, 1.0));
+        tile.components_mut(FilmPlane::Shadow, column, row).fill(lit_part(light.luminance));
         let groups = tile.components_mut(FilmPlane::LightGroups, column, row);
         for (group, components) in (0..).zip(groups.chunks_mut(3)) {
             let of_background = usize::try_from(group) == Ok(self.background_group());

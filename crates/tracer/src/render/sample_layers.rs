@@ -215,9 +215,7 @@ impl SampleLayers {
             let sample = |s: usize| self.direct[s / LANES][part][s % LANES];
             range.clone().map(sample).sum()
         };
-        let (whole, arriving) = (sum(0), sum(1));
-        let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
-        lit.clamp(0.0, 1.0)
+        lit_part([sum(0), sum(1)])
     }
 
     /// Stores the mean light of each class. `limited` is added to the background.
@@ -252,6 +250,12 @@ impl SampleLayers {
             light.copy_from_slice(&mean.to_array());
         }
     }
+}
+
+/// The part of direct light that arrives, 0 to 1, by its luminance: if nothing is in the way, and what arrives.
+pub(super) fn lit_part([whole, arriving]: [f32; 2]) -> f32 {
+    let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
+    lit.clamp(0.0, 1.0)
 }
 
 /// The mean of the samples in `range`.
