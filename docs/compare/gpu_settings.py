@@ -45,6 +45,11 @@ OTHERS = {
     "styles": ["--style", 'x > 5: spheres, radius 0.1, color gold, material { type = "metal", roughness = 0.3 }'],
     "lights": ["--set", 'light=[{ type = "sphere", position = [5, 5, 25], radius = 2, visible = true, group = "key" }]'],
     "whitted": ["--integrator", "whitted", "--ground", "none", "--look", "none"],
+    "glass": ["--set", 'material.type="glass"'],
+    "glass, clamp, transparent": ["--set", 'material.type="glass"', "--set", "render.clamp=0.2", "--set", "output.transparent=true"],
+    "rough glass": ["--set", 'material.type="glass"', "--set", "material.roughness=0.3"],
+    "coloured glass": ["--set", 'material.type="glass"', "--set", 'material.absorption="color"', "--color-by", "x"],
+    "whitted, glass": ["--integrator", "whitted", "--ground", "none", "--look", "none", "--set", "material.transmission=1"],
 }
 
 

@@ -201,7 +201,8 @@ pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
 
 fn key_of(missing: Missing) -> &'static str {
     match missing {
-        Missing::Transmission => "material.transmission",
+        Missing::Photons => "render.caustics",
+        Missing::StylesInGlass => "style",
         Missing::Ground => "render.ground",
         Missing::Lens => "camera.f_stop",
         Missing::Stereo => "camera.stereo",
@@ -435,7 +436,7 @@ mod tests {
             let shading = ParticleShading::constant(Vec3::ONE);
             let (mut film, never) = (Film::default(), AtomicBool::new(false));
             let renderer = renderer.ready()?;
-            renderer.prepare(&spheres, &shading).map_err(failed)?;
+            renderer.prepare(&spheres, None, &shading).map_err(failed)?;
             let rendered = renderer.render_into(&mut film, &scene, &shading, &settings, &never);
             rendered.map_err(scene_failed).map(|_| film.color)
         };

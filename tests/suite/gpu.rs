@@ -100,6 +100,17 @@ mod on_a_device {
         assert_equal(&workshop, ["gpu", "cpu"]);
     }
 
+    /// Above the shadow catcher of the default look.
+    #[test]
+    fn glass_is_that_of_the_cpu() {
+        let Some(workshop) = workshop_with_device() else { return };
+        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
+            let glass = ["--set=material.type=\"glass\""];
+            workshop.render_to(out, &[&glass[..], device].concat()).expect(0);
+        }
+        assert_equal(&workshop, ["gpu", "cpu"]);
+    }
+
     /// The part of the light that `render.clamp` takes away.
     #[test]
     fn limited_light_is_reported() {
@@ -225,6 +236,10 @@ mod on_a_device {
                 "render.ground: a ground",
             ),
             (&[whitted, "--ground=checker"], "render.ground: a ground"),
+            (
+                &["--ground=plain", "--set=material.type=\"glass\""],
+                "render.caustics: caustics of transmissive particles",
+            ),
             (&[whitted, "--surface=union"], "render.surface"),
             (&[whitted, "--gpu=9"], "there is no GPU 9"),
         ] {

@@ -26,7 +26,9 @@ pub(crate) struct Kernels {
 pub(crate) struct Variant {
     /// Whether paths are traced.
     has_paths: bool,
-    /// Whether spheres have an opacity each.
+    /// Whether the colours of spheres have an opacity each.
+    colors_have_opacity: bool,
+    /// Whether it matters: transmissive spheres have an inside.
     has_opacity: bool,
     /// Whether indirect light has a limit.
     has_clamp: bool,
@@ -38,6 +40,10 @@ pub(crate) struct Variant {
     has_objects: bool,
     /// Whether light is kept by parts.
     has_layers: bool,
+    /// Whether spheres are transmissive.
+    has_glass: bool,
+    /// Whether they are rough then.
+    is_rough: bool,
     /// Whether radii are equal.
     is_common: bool,
     /// Whether spheres and the camera move while the shutter is open.
@@ -54,19 +60,27 @@ const PATHS: [&str; 5] = [
     include_str!("shaders/bsdf.wgsl"),
     include_str!("shaders/path.wgsl"),
 ];
+const SMOOTH_GLASS: [&str; 2] =
+    [include_str!("shaders/glass.wgsl"), include_str!("shaders/smooth_glass.wgsl")];
+const ROUGH_GLASS: [&str; 2] =
+    [include_str!("shaders/glass.wgsl"), include_str!("shaders/rough_glass.wgsl")];
 const WHITTED: [&str; 1] = [include_str!("shaders/whitted.wgsl")];
 
 impl Variant {
     /// What a picture of a tree needs.
     pub(crate) fn of(picture: &Picture<'_>, shape: &TreeShape, has_opacity: bool) -> Self {
+        let has_glass = picture.kept_rays().is_some();
         Self {
+            colors_have_opacity: has_opacity,
             has_paths: picture.has_paths(),
-            has_opacity,
+            has_opacity: has_opacity && !has_glass,
             has_clamp: picture.has_clamp(),
             has_detail: picture.detail().is_some(),
             has_mirrors: picture.ray_kinds().has_mirrors,
             has_objects: picture.has_objects,
             has_layers: picture.light_groups.is_some(),
+            has_glass,
+            is_rough: picture.has_rough_glass(),
             is_common: shape.is_common,
             has_motion: shape.has_motion,
             levels: shape.levels.max(MIN_STACK_LEVELS),
@@ -82,10 +96,13 @@ impl Variant {
             ("HAS_MIRRORS", self.has_mirrors),
             ("HAS_OBJECTS", self.has_objects),
             ("HAS_LAYERS", self.has_layers),
+            ("HAS_GLASS", self.has_glass),
         ];
         let flags = flags.map(|(name, value)| format!("const {name}: bool = {value};\n"));
         let stack = format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * self.levels);
-        [stack, flags.concat()].concat()
+        let color =
+            format!("const COLOR: u32 = {}u;\n", if self.colors_have_opacity { 4 } else { 3 });
+        [stack, color, flags.concat()].concat()
     }
 }
 
@@ -102,6 +119,11 @@ impl Kernels {
         } else {
             include_str!("shaders/still.wgsl")
         };
+        let glass: &[&str] = match (variant.has_glass, variant.is_rough) {
+            (false, _) => &[include_str!("shaders/opaque.wgsl")],
+            (true, false) => &SMOOTH_GLASS,
+            (true, true) => &ROUGH_GLASS,
+        };
         let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
         let source = [
             device.arithmetic().source(),
@@ -115,16 +137,25 @@ impl Kernels {
             include_str!("shaders/traverse.wgsl"),
             include_str!("shaders/camera.wgsl"),
             include_str!("shaders/surface.wgsl"),
+            include_str!("shaders/clear.wgsl"),
             include_str!("shaders/lights.wgsl"),
             include_str!("shaders/layers.wgsl"),
             include_str!("shaders/queues.wgsl"),
             include_str!("shaders/sampler.wgsl"),
+            include_str!("shaders/segments.wgsl"),
             append,
+            &glass.concat(),
             &model.concat(),
         ];
         let module = device.module(&source.concat());
         let kernel = |entry, bindings: &[u32]| Kernel::new(device, &module, entry, bindings);
         let of_motion: &[u32] = if variant.has_motion { &[22] } else { &[] };
+        // Rays that glass ends see the background, which is a part of the light
+        let [of_glass, of_next]: [&[u32]; 2] = match (variant.has_glass, variant.has_paths) {
+            (false, _) => [&[], &[]],
+            (true, true) => [&[23], &[23]],
+            (true, false) => [&[23], &[21, 23]],
+        };
         let tracing = |entry, bindings: &[u32]| kernel(entry, &[bindings, of_motion].concat());
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
             [
@@ -141,8 +172,8 @@ impl Kernels {
         };
         Self {
             empty_queues: kernel("empty_queues", &[8, 13, 14]),
-            trace_camera: tracing("trace_camera", camera),
-            trace_next: tracing("trace_next", next),
+            trace_camera: tracing("trace_camera", &[camera, of_glass].concat()),
+            trace_next: tracing("trace_next", &[next, of_next].concat()),
             trace_shadow: tracing("trace_shadow", shadow),
             clamp_indirect: (variant.has_clamp)
                 .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18, 21])),

@@ -61,7 +61,11 @@
 //!         reflection: 0.0,
 //!         ior: 1.5,
 //!         is_exact_fresnel: false,
+//!         transmission: 0.0,
+//!         extinction: [0.0; 3],
+//!         color_length: None,
 //!     },
+//!     split_weight: 1.0,
 //!     lights: &[Light {
 //!         place: LightPlace::Distant([0.0, -1.0, 0.0]),
 //!         radiance: [1.0; 3],

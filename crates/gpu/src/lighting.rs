@@ -26,6 +26,8 @@ pub(crate) struct RayKinds {
     pub(crate) has_mirrors: bool,
     /// Whether light is kept by parts.
     pub(crate) has_layers: bool,
+    /// Number of rays that a pixel keeps for later, if spheres are transmissive.
+    pub(crate) kept: Option<u32>,
     /// Number of lights.
     pub(crate) lights: u32,
 }
@@ -43,9 +45,24 @@ impl RayKinds {
         self.first_light() + self.lights + of_catcher
     }
 
+    /// Number of queues at each depth: of rays that go on, and of shadow rays by source. Refracted rays are counted as if
+    /// they had another.
+    pub(crate) const fn queues(self) -> u32 {
+        1 + self.sources() + self.kept.is_some() as u32
+    }
+
     /// Memory of a ray that goes on, bytes.
     pub(crate) const fn ray_bytes(self) -> u64 {
-        self.common_bytes() + if self.has_mirrors { 16 } else { 0 }
+        let of_mirrors = if self.has_mirrors { 16 } else { 0 };
+        match self.kept {
+            None => self.common_bytes() + of_mirrors,
+            Some(_) => 64 + of_mirrors,
+        }
+    }
+
+    /// Memory of the rays that a pixel keeps, bytes.
+    pub(crate) fn kept_bytes(self) -> u64 {
+        48 * u64::from(self.kept.unwrap_or_default())
     }
 
     /// Memory of a shadow ray, bytes.
@@ -78,6 +95,9 @@ pub struct Lighting {
     pub environment_group: u32,
     /// The ground.
     pub ground: Option<Ground>,
+    /// The microfacets of transmissive spheres, if these are rough: the table has the numbers for light from outside, and
+    /// those from inside.
+    pub rough_glass: Option<Rough>,
     /// How the spheres reflect light, by the index of the first of each group; at least one, and at most
     /// [`MAX_FINISHES`].
     pub finishes: Vec<(u32, Finish)>,
@@ -216,6 +236,9 @@ pub(crate) struct SceneUniform {
     detail_size: [u32; 2],
     environment_group: u32,
     zero: u32,
+    glass_alpha: f32,
+    glass_table: u32,
+    glass_zeros: [u32; 2],
     finishes: [FinishUniform; MAX_FINISHES],
     harmonics: [[f32; 4]; 9],
 }
@@ -258,6 +281,9 @@ impl From<&Lighting> for SceneUniform {
             indirect_limit: lighting.indirect_limit.unwrap_or_default(),
             ..Self::zeroed()
         };
+        if let Some(Rough { alpha, table }) = lighting.rough_glass {
+            (uniform.glass_alpha, uniform.glass_table) = (alpha, table);
+        }
         for (place, finish) in uniform.finishes.iter_mut().zip(&lighting.finishes) {
             *place = finish.into();
             uniform.finish_count += 1;

@@ -10,7 +10,7 @@ use crate::lighting::{Detail, Lighting, Model, RayKinds};
 pub const MAX_LIGHTS: usize = 8;
 
 /// The first light group among the layers of light, as in `shaders/layers.wgsl`.
-pub(crate) const FIRST_GROUP: u32 = 8;
+pub(crate) const FIRST_GROUP: u32 = 10;
 
 /// A picture to render.
 #[derive(Debug, Clone, Copy)]
@@ -31,14 +31,17 @@ pub struct Picture<'a> {
     pub light_groups: Option<u32>,
     /// The transport of light.
     pub model: Model<'a>,
-    /// Whitted's model: recursion depth; 1 is direct light only. Rays beyond see the background.
+    /// Recursion depth of Whitted's model, and of paths through transmissive spheres; 1 is direct light only. Rays beyond
+    /// see the background or the environment.
     pub max_depth: u32,
     /// What rays without an intersection see.
     pub background: Background,
     /// Whether camera rays see no background.
     pub is_transparent: bool,
-    /// Whitted's model: the material of all spheres.
+    /// The material of all spheres: in path tracing only of transmissive ones.
     pub material: Material,
+    /// The least weight of a path both of whose rays go on at transmissive spheres.
+    pub split_weight: f32,
     /// Lights, at most [`MAX_LIGHTS`].
     pub lights: &'a [Light],
 }
@@ -60,14 +63,25 @@ impl Picture<'_> {
         matches!(self.model, Model::Paths(Lighting { indirect_limit: Some(_), .. }))
     }
 
+    /// Whether transmissive spheres are rough.
+    pub(crate) const fn has_rough_glass(&self) -> bool {
+        matches!(self.model, Model::Paths(Lighting { rough_glass: Some(_), .. }))
+    }
+
     /// What its rays are.
     pub(crate) fn ray_kinds(&self) -> RayKinds {
         RayKinds {
             has_paths: self.has_paths(),
             has_mirrors: matches!(self.model, Model::Paths(Lighting { has_mirrors: true, .. })),
             has_layers: self.light_groups.is_some(),
+            kept: self.kept_rays(),
             lights: u32::try_from(self.lights.len()).expect("at most MAX_LIGHTS"),
         }
+    }
+
+    /// Number of rays that a pixel keeps for later.
+    pub(crate) fn kept_rays(&self) -> Option<u32> {
+        (self.material.transmission > 0.0).then(|| most_kept(self.split_weight, self.max_depth))
     }
 
     /// Number of layers of light.
@@ -84,6 +98,15 @@ impl Picture<'_> {
     pub(crate) fn has_extents(&self) -> bool {
         self.lights.iter().any(|light| light.place.has_extent())
     }
+}
+
+/// Number of rays that a pixel keeps at most, if paths split down to a weight. Of two rays, the greater is kept, so that
+/// the weight of the other one has halved.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small")]
+pub(crate) fn most_kept(split_weight: f32, max_depth: u32) -> u32 {
+    let by_weight = (1.0 / split_weight).log2().ceil() as u32;
+    // The weights of rays from rough surfaces may add up to a little more than 1
+    by_weight.saturating_add(1).min(max_depth.saturating_sub(1)).max(1)
 }
 
 /// A camera: the ray through the point `(a, b)` of the film, right and up from its middle, has the direction `forward + a
@@ -170,6 +193,12 @@ pub struct Material {
     pub ior: f32,
     /// Whether the reflectance is that of a dielectric instead of Schlick's approximation.
     pub is_exact_fresnel: bool,
+    /// Weight of the refracted ray; spheres are opaque if it is 0.
+    pub transmission: f32,
+    /// Extinction in the medium of a sphere, per unit of length.
+    pub extinction: [f32; 3],
+    /// The length after which the medium of each sphere has its colour instead.
+    pub color_length: Option<f32>,
 }
 
 /// A light.
@@ -270,6 +299,12 @@ pub(crate) struct View {
     pub(crate) reflection: f32,
     pub(crate) ior: f32,
     pub(crate) is_exact_fresnel: u32,
+    pub(crate) extinction: [f32; 3],
+    pub(crate) transmission: f32,
+    pub(crate) split_weight: f32,
+    pub(crate) color_length: f32,
+    pub(crate) kept: u32,
+    pub(crate) queues: u32,
     pub(crate) open: CameraUniform,
     pub(crate) close: CameraUniform,
     pub(crate) lights: [LightUniform; MAX_LIGHTS],
@@ -400,6 +435,12 @@ impl View {
             reflection: material.reflection,
             ior: material.ior,
             is_exact_fresnel: material.is_exact_fresnel.into(),
+            extinction: material.extinction,
+            transmission: material.transmission,
+            split_weight: picture.split_weight,
+            color_length: material.color_length.unwrap_or_default(),
+            kept: picture.kept_rays().unwrap_or_default(),
+            queues: picture.ray_kinds().queues(),
             lights,
             ..Self::default()
         }

@@ -36,6 +36,10 @@ pub enum LightLayer {
     Arrival,
     /// The part of its light that a shadow catcher lacks.
     Loss,
+    /// Reflection by transmissive spheres.
+    Reflection,
+    /// Refraction by transmissive spheres.
+    Refraction,
     /// A light group, by its number.
     Group(u32),
 }
@@ -51,6 +55,8 @@ impl LightLayer {
             Self::Direct => 4,
             Self::Arrival => 5,
             Self::Loss => 6,
+            Self::Reflection => 8,
+            Self::Refraction => 9,
             Self::Group(group) => FIRST_GROUP + group,
         }
     }
@@ -107,6 +113,8 @@ pub struct Cost {
     pub shadow_rays: u64,
     /// Reflected rays, also by rough surfaces.
     pub reflected_rays: u64,
+    /// Rays that transmissive spheres refract.
+    pub refracted_rays: u64,
     /// Light that the clamp of indirect light took away, in the steps of `LostLight`.
     pub lost_steps: u64,
     /// Memory of the device, bytes.

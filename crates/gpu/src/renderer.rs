@@ -13,7 +13,7 @@ use crate::arrays::{Array, Download, Uniform, Uniforms};
 use crate::commands::{Commands, Timer};
 use crate::kernels::{Kernels, Variant};
 use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
-use crate::picture::{FIRST_GROUP, FilmSize, Picture, Samples, View};
+use crate::picture::{FIRST_GROUP, FilmSize, Picture, Samples, View, most_kept};
 use crate::pixels::{Cost, Pixels};
 use crate::spheres::Spheres;
 use crate::tree::{TreeBuilder, TreeShape};
@@ -24,7 +24,10 @@ const GROUP: u64 = 64;
 /// Counters of the light that is lost.
 const LOST_WORDS: usize = 2;
 /// Largest number of stages whose time is measured; pictures with more samples have several in a stage.
-const MAX_STAGES: u32 = 257;
+const MAX_STAGES: u32 = 1025;
+/// Depths between two questions whether the rays of all pixels have ended, if spheres are transmissive. The last of these
+/// depths writes the same queue as the first.
+const DEPTHS_OF_GLASS: u32 = 33;
 
 /// Base colours of spheres, linear RGB.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +47,7 @@ struct Stage {
     depth: u32,
     source: u32,
     counters: u32,
-    zero: u32,
+    last: u32,
 }
 
 /// A uniform of the kernels.
@@ -79,6 +82,7 @@ struct Traced {
     pixels: u64,
     samples: u32,
     sources: u32,
+    queues: u32,
     has_odd: bool,
     has_objects: bool,
     layers: u32,
@@ -102,12 +106,13 @@ struct TraceArrays {
     detail: Array,
     objects: Array,
     layers: Array,
+    kept: Array,
     /// The version of the tables that these three hold.
     tables: Option<u64>,
 }
 
 impl TraceArrays {
-    fn all(&self) -> [&Array; 15] {
+    fn all(&self) -> [&Array; 16] {
         let [rays, other_rays] = &self.rays;
         [
             &self.colors,
@@ -125,6 +130,7 @@ impl TraceArrays {
             &self.detail,
             &self.objects,
             &self.layers,
+            &self.kept,
         ]
     }
 
@@ -183,6 +189,8 @@ fn needs_of(scene: &Scene, settings: &RenderSettings) -> (RayKinds, [u64; 2]) {
         has_paths,
         has_mirrors: has_paths && mirrors_see_through(scene, settings),
         has_layers: light_groups.is_some(),
+        kept: (scene.particle_material().transmission > 0.0)
+            .then(|| most_kept(settings.min_weight, settings.max_depth)),
         lights: u32::try_from(scene.lights.len()).unwrap_or(u32::MAX),
     };
     let objects = object_bytes(settings.channels.mattes().next().is_some(), settings.samples);
@@ -195,7 +203,8 @@ pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
     let (rays, [objects, layers]) = needs_of(scene, settings);
     let shadows = rays.shadow_bytes() * u64::from(rays.sources());
     let pixels = u64::from(settings.width) * u64::from(settings.height);
-    shadows.max(rays.ray_bytes()).max(objects).max(layers) * pixels
+    let arrays = [shadows, rays.ray_bytes(), rays.kept_bytes(), objects, layers];
+    arrays.into_iter().max().unwrap_or_default() * pixels
 }
 
 /// Memory of the device for the film and the queues of each pixel, bytes.
@@ -203,7 +212,7 @@ pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
     let (rays, [objects, layers]) = needs_of(scene, settings);
     let film = film_bytes(settings.has_features, rays.has_paths && settings.clamp.is_some());
     let shadows = rays.shadow_bytes() * u64::from(rays.sources());
-    4 + film + 32 + objects + layers + 2 * rays.ray_bytes() + shadows
+    4 + film + 32 + objects + layers + 2 * rays.ray_bytes() + shadows + rays.kept_bytes()
 }
 
 impl Renderer {
@@ -281,7 +290,10 @@ impl Renderer {
         let plan = self.plan(picture, &shape);
         self.uniforms.upload(device)?;
         // Trace sample by sample
-        let per_stage = picture.samples.count.div_ceil(MAX_STAGES - 1).max(1);
+        let per_stage = match plan.last {
+            0 => picture.samples.count.div_ceil(MAX_STAGES - 1).max(1),
+            _ => 1,
+        };
         self.stages = 1;
         for samples in plan.samples.chunks(per_stage as usize) {
             if is_stopped() {
@@ -292,9 +304,8 @@ impl Renderer {
             for sample in samples {
                 self.add_sample(&mut commands, &self.kernels[&variant], &plan, *sample);
             }
-            commands.end_stage(self.timer.as_ref().map(|timer| (timer, self.stages)));
-            commands.submit();
-            self.stages += 1;
+            self.submit_stage(commands);
+            self.trace_kept(device, &plan, variant, samples, is_stopped)?;
         }
         let mut commands = Commands::new(device);
         self.add_count(&mut commands, &self.kernels[&variant], &plan);
@@ -303,11 +314,47 @@ impl Renderer {
             pixels: picture.film.pixels(),
             samples: picture.samples.count,
             sources: picture.sources(),
+            queues: picture.ray_kinds().queues(),
             has_odd: picture.has_odd,
             has_objects: picture.has_objects,
             layers: picture.layer_count(),
         });
         device.check()
+    }
+
+    /// Starts the dispatches of a stage, whose time is measured unless there are too many.
+    fn submit_stage(&mut self, mut commands: Commands<'_>) {
+        let timer = self.timer.as_ref().filter(|_| self.stages < MAX_STAGES);
+        commands.end_stage(timer.map(|timer| (timer, self.stages)));
+        commands.submit();
+        self.stages = (self.stages + 1).min(MAX_STAGES);
+    }
+
+    /// Traces what is left of a sample with transmissive spheres, until the rays of all pixels have ended.
+    fn trace_kept(
+        &mut self,
+        device: &Device,
+        plan: &Plan,
+        variant: Variant,
+        samples: &[Uniform],
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<(), GpuError> {
+        let ([sample], 1..) = (samples, plan.last) else { return Ok(()) };
+        loop {
+            let lengths: Vec<u32> = bytemuck::pod_collect_to_vec(&self.arrays.queued.read(device)?);
+            if lengths[plan.last] == 0 {
+                return Ok(());
+            }
+            if is_stopped() {
+                device.wait()?;
+                return Err(GpuError::Interrupted);
+            }
+            let mut commands = Commands::new(device);
+            let kernels = &self.kernels[&variant];
+            self.add_count(&mut commands, kernels, plan);
+            self.add_depths(&mut commands, kernels, plan, *sample, 1);
+            self.submit_stage(commands);
+        }
     }
 
     /// Waits for the picture that was started last, and passes its pixels to `store`.
@@ -361,11 +408,15 @@ impl Renderer {
     /// # Panics
     /// Without a picture.
     pub fn cost(&self, device: &Device) -> Result<Cost, GpuError> {
-        let Traced { pixels, samples, sources, .. } = self.traced.expect("a picture was traced");
+        let Traced { pixels, samples, sources, queues, .. } =
+            self.traced.expect("a picture was traced");
         let counts: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
         let (lengths, lost) = counts.split_at(counts.len() - LOST_WORDS);
-        // The first queue of each depth has reflected rays, the others shadow rays
-        let reflected = lengths.iter().step_by(1 + sources as usize).sum();
+        // The first queue of each depth has rays that go on, those of the sources shadow rays
+        let of_queue = |queue: u32| -> u64 {
+            lengths.iter().skip(queue as usize).step_by(queues as usize).sum()
+        };
+        let refracted = if queues > 1 + sources { of_queue(1 + sources) } else { 0 };
         let seconds = match &self.timer {
             Some(timer) => timer.seconds(device, self.stages)?,
             None => Vec::new(),
@@ -375,8 +426,9 @@ impl Renderer {
             build_seconds: seconds.first().copied().unwrap_or_default(),
             trace_seconds: seconds.iter().skip(1).sum(),
             primary_rays: pixels * u64::from(samples),
-            reflected_rays: reflected,
-            shadow_rays: lengths.iter().sum::<u64>() - reflected,
+            reflected_rays: of_queue(0) - refracted,
+            refracted_rays: refracted,
+            shadow_rays: (1..=sources).map(of_queue).sum(),
             lost_steps: lost[0].saturating_add(lost[1].saturating_mul(1 << 32)),
             bytes: self.tree.bytes() + arrays,
             tree_bytes: self.tree.bytes(),
@@ -400,6 +452,7 @@ impl Renderer {
         }
         let shadows = rays.shadow_bytes() * u64::from(rays.sources());
         arrays.shadows.reserve(device, "shadow rays", shadows * pixels)?;
+        arrays.kept.reserve(device, "rays through glass", rays.kept_bytes() * pixels)?;
         if let Model::Paths(lighting) = picture.model {
             arrays.write_tables(device, lighting)?;
         }
@@ -445,15 +498,21 @@ impl Renderer {
         let samples = samples
             .map(|sample| uniforms.push(&Current { sample, ..Current::default() }))
             .collect();
-        let mut push = |stage: Stage| uniforms.push(&Stage { counters, ..stage });
+        let depth_count = depth_count(picture);
+        let last = match picture.kept_rays() {
+            Some(_) => (depth_count - 1) * picture.ray_kinds().queues(),
+            None => 0,
+        };
+        let mut push = |stage: Stage| uniforms.push(&Stage { counters, last, ..stage });
         let mut all = |stages: &mut dyn Iterator<Item = Stage>| stages.map(&mut push).collect();
-        let depths = 1..=depth_count(picture);
+        let depths = 1..=depth_count;
         let sources = 0..picture.sources();
         Plan {
             view,
             scene,
             film: picture.film,
             counters,
+            last: last as usize,
             samples,
             depths: all(&mut depths.clone().map(|depth| Stage { depth, ..Stage::default() })),
             sources: depths
@@ -474,9 +533,22 @@ impl Renderer {
         plan: &Plan,
         sample: Uniform,
     ) {
-        let pixels = plan.film.pixels();
         self.add_count(commands, kernels, plan);
-        for (number, (depth, sources)) in plan.depths.iter().zip(&plan.sources).enumerate() {
+        self.add_depths(commands, kernels, plan, sample, 0);
+    }
+
+    /// Adds the dispatches of one sample from a depth on, which counts from 0.
+    fn add_depths(
+        &self,
+        commands: &mut Commands<'_>,
+        kernels: &Kernels,
+        plan: &Plan,
+        sample: Uniform,
+        first: usize,
+    ) {
+        let pixels = plan.film.pixels();
+        let depths = plan.depths.iter().zip(&plan.sources).enumerate();
+        for (number, (depth, sources)) in depths.skip(first) {
             let array_of = |binding| self.array(binding, plan, [sample, *depth], number);
             if number == 0 {
                 let squares = [plan.film.width.div_ceil(8), plan.film.height.div_ceil(8)];
@@ -529,15 +601,17 @@ impl Renderer {
             19 => &arrays.detail,
             20 => &arrays.objects,
             21 => &arrays.layers,
+            23 => &arrays.kept,
             _ => return self.tree.traversal_array(binding).expect("1 to 3 are those of the tree"),
         };
         array.binding()
     }
 }
 
-/// Number of rays one after the other.
+/// Number of rays one after the other; with transmissive spheres, as many before the next question.
 fn depth_count(picture: &Picture<'_>) -> u32 {
     match picture.model {
+        _ if picture.kept_rays().is_some() => DEPTHS_OF_GLASS,
         Model::Whitted if picture.material.reflection > 0.0 => picture.max_depth,
         Model::Whitted => 1,
         // The last segment finds lights; without any, it is a shadow ray to the environment
@@ -562,17 +636,18 @@ fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
         },
         (Some(_), None) => false,
         (None, Some(scene)) if scene.environment.is_none() => false,
-        (None, Some(scene)) if source == 1 => depth > scene.bounces && !picture.has_extents(),
+        (None, Some(scene)) if source == 1 => {
+            depth > scene.bounces && !picture.has_extents() && rays.kept.is_none()
+        }
         (None, _) => true,
     }
 }
 
-/// Number of counters of a sample: the lengths of its queues, for each depth one of rays that go on, and one of shadow
-/// rays for each source; then the light that is lost.
+/// Number of counters of a sample: the lengths of its queues at each depth, then the light that is lost.
 fn counter_count(picture: &Picture<'_>) -> u32 {
     #[expect(clippy::cast_possible_truncation, reason = "it is 2")]
     let lost = LOST_WORDS as u32;
-    depth_count(picture) * (1 + picture.sources()) + lost
+    depth_count(picture) * picture.ray_kinds().queues() + lost
 }
 
 /// The uniforms of a picture.
@@ -583,6 +658,8 @@ struct Plan {
     film: FilmSize,
     /// Number of counters of a sample.
     counters: u32,
+    /// The queue of the rays that go on behind the last depth, or 0.
+    last: usize,
     samples: Vec<Uniform>,
     depths: Vec<Uniform>,
     /// The sources of shadow rays of each depth.

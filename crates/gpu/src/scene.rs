@@ -8,14 +8,16 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
     DeviceHit, DeviceLight, DeviceObject, DevicePixel, DevicePixels, Extent, extent_of,
-    needs_light_parts, store_pixels,
+    needs_light_parts, needs_photons, store_pixels,
 };
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
     RenderSettings, ShadeSource, Stop,
 };
 use spherule_tracer::scene::ground::Pattern;
-use spherule_tracer::scene::{self, Falloff, Fresnel, LightKind, Projection, Scene, background};
+use spherule_tracer::scene::{
+    self, Falloff, Fresnel, LightKind, Owner, Projection, Scene, background,
+};
 use spherule_tree::accel;
 use spherule_tree::blocks::StoredLeaves;
 
@@ -33,8 +35,10 @@ use crate::{Device, GpuError};
 /// What the device lacks of the renderer for CPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
-    /// Light through particles.
-    Transmission,
+    /// Light that transmissive particles focus on other surfaces.
+    Photons,
+    /// Styles beside transmissive particles.
+    StylesInGlass,
     /// A ground in Whitted's model, or one with sand or a picture.
     Ground,
     /// Depth of field in Whitted's model.
@@ -60,7 +64,8 @@ pub enum Missing {
 impl fmt::Display for Missing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Transmission => "transmissive particles",
+            Self::Photons => "caustics of transmissive particles",
+            Self::StylesInGlass => "styles beside transmissive particles",
             Self::Ground => "a ground in Whitted's model, or one of sand or with a picture",
             Self::Lens => "depth of field in Whitted's model",
             Self::Stereo => "stereo pairs",
@@ -81,11 +86,15 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     let camera = &scene.camera;
     let is_whitted = settings.integrator == IntegratorKind::Whitted;
     let has_extent = |light: &scene::Light| light.kind.has_extent();
+    let is_clear = material.transmission > 0.0;
+    let is_style = |of: &scene::Material| matches!(of.owner, Owner::Style(_) | Owner::Part(_));
+    let has_styles = scene.materials.iter().any(is_style);
     let is_plain = |ground: &scene::Ground| {
         !is_whitted && matches!(ground.pattern, Pattern::Plain | Pattern::Checker { .. })
     };
     [
-        (material.transmission > 0.0, Missing::Transmission),
+        (needs_photons(scene, settings), Missing::Photons),
+        (is_clear && has_styles, Missing::StylesInGlass),
         (scene.ground.as_ref().is_some_and(|ground| !is_plain(ground)), Missing::Ground),
         (camera.lens().is_some() && is_whitted, Missing::Lens),
         (camera.stereo().is_some(), Missing::Stereo),
@@ -315,6 +324,7 @@ impl SceneRenderer {
                 IntegratorKind::Path => Model::Paths(self.lighting.of(scene, source, settings)),
             },
             material: material_of(scene),
+            split_weight: settings.min_weight,
             lights: &lights,
         };
         Ok(self.renderer.trace(&self.device, &picture, &|| stop.is_raised())?)
@@ -352,6 +362,8 @@ impl DevicePixels for SummedPixels<'_> {
         DeviceLight {
             diffuse: of(LightLayer::Diffuse),
             specular: of(LightLayer::Specular),
+            reflection: of(LightLayer::Reflection),
+            refraction: of(LightLayer::Refraction),
             emission: of(LightLayer::Emission),
             background: of(LightLayer::Background),
             direct: of(LightLayer::Direct),
@@ -380,7 +392,7 @@ pub const fn ray_counts(cost: &Cost) -> RayCounts {
         primary: cost.primary_rays,
         shadow: cost.shadow_rays,
         reflection: cost.reflected_rays,
-        refraction: 0,
+        refraction: cost.refracted_rays,
         lost: LostLight::from_steps(cost.lost_steps),
         samples: 0,
         noisy_pixels: 0,
@@ -439,6 +451,9 @@ fn material_of(scene: &Scene) -> Material {
         reflection: material.reflection,
         ior: material.ior,
         is_exact_fresnel: material.fresnel == Fresnel::Exact,
+        transmission: material.transmission,
+        extinction: material.extinction.to_array(),
+        color_length: material.color_length,
     }
 }
 

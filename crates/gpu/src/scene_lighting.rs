@@ -6,11 +6,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
 use spherule_tracer::render::device::{
-    ambient_reach, light_on, mirrors_see_through, reflected_by_white, rough_table,
+    ambient_reach, light_on, mirrors_see_through, reflected_by_white, rough_glass_table,
+    rough_table,
 };
 use spherule_tracer::render::{IndirectLight, RenderSettings, ShadeSource};
 use spherule_tracer::scene::ground::Pattern;
-use spherule_tracer::scene::{self, Finish, Scene, environment::TableArrays};
+use spherule_tracer::scene::{self, Finish, Material, Scene, environment::TableArrays};
 
 use crate::lighting::{self, Catcher, Ground, Lighting, Rough, TablePlace, Tables};
 
@@ -20,6 +21,8 @@ struct Key {
     environment: Option<Arc<scene::Environment>>,
     /// Those of the groups of spheres.
     finishes: Vec<Finish>,
+    /// The particles, if rays enter them.
+    glass: Option<Material>,
     /// The normal of a shadow catcher.
     catcher: Option<Vec3>,
 }
@@ -32,6 +35,7 @@ impl Key {
         Self {
             environment: scene.environment.clone().filter(|environment| !environment.is_black()),
             finishes: materials.map(|material| material.finish).collect(),
+            glass: Some(*scene.particle_material()).filter(|material| material.transmission > 0.0),
             catcher: ground.filter(|ground| ground.shadow_catcher.is_some()).map(|g| g.up),
         }
     }
@@ -42,7 +46,10 @@ impl Key {
             (None, None) => true,
             _ => false,
         };
-        environments && self.finishes == other.finishes && self.catcher == other.catcher
+        environments
+            && self.finishes == other.finishes
+            && self.glass == other.glass
+            && self.catcher == other.catcher
     }
 }
 
@@ -100,7 +107,13 @@ fn prepared(key: &Key) -> Lighting {
             table: light.map_or_else(TablePlace::default, |table| tables.add(table.arrays())),
         }
     });
+    let rough_glass = key.glass.as_ref().and_then(rough_glass_table).map(|(alpha, numbers)| {
+        let table = Tables::place(&tables.constants);
+        tables.constants.extend(numbers);
+        Rough { alpha, table }
+    });
     Lighting {
+        rough_glass,
         environment: environment.map(|environment| environment_of(environment, &mut tables)),
         ground: catcher.map(|catcher| Ground { catcher: Some(catcher), ..NO_GROUND }),
         finishes,

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
 use spherule_tracer::render::Stop;
 use spherule_tree::math::SimdLevel;
-use support::{Case, Data, Difference, Opacity, Paths, Radii};
+use support::{Case, Data, Difference, Glass, Opacity, Paths, Radii};
 
 /// Half the distance of neighbouring 16-bit floats below 2, where the colours of these pictures are.
 const HALF_UNIT_OF_F16: f32 = 0.5 / 1024.0;
@@ -178,6 +178,14 @@ fn parts_of_the_light_are_those_of_the_cpu() {
         let Difference { mean, bias, layers: [difference, size], .. } = found;
         assert!(mean.max(bias).max(difference) < 1e-3 && size > 1.0, "{paths:?}: {found:?}");
     }
+    // Rays split at the first surface, too
+    for (glass, paths) in [(Glass::Smooth, Paths::Lights), (Glass::Absorbing, Paths::Look)] {
+        let case =
+            Case { glass: Some(glass), paths: Some(paths), has_layers: true, ..case_of_glass() };
+        let found = support::compare(&mut renderer, &case, level);
+        let Difference { mean, layers: [difference, size], .. } = found;
+        assert!(mean.max(difference) < 1e-3 && size > 1.0, "{case:?}: {found:?}");
+    }
     // With a limit of indirect light, each part loses as much
     for paths in [Paths::Coats, Paths::Lights] {
         let clamp = Some(0.1);
@@ -186,6 +194,34 @@ fn parts_of_the_light_are_those_of_the_cpu() {
         let found = support::compare(&mut renderer, &case, level);
         let Difference { layers: [difference, size], lost: [lost, _], .. } = found;
         assert!(difference < 1e-3 && size > 1.0 && lost > 1e-3, "{paths:?}: {found:?}");
+    }
+}
+
+fn case_of_glass() -> Case {
+    Case { particles: 300, max_depth: 8, samples: 3, ..Case::small() }
+}
+
+/// Rays split at particles as on the CPU, and shadow rays pass them straight.
+#[test]
+fn glass_is_that_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    let of = |glass| Case { glass: Some(glass), ..case_of_glass() };
+    let of_paths = |glass, paths| Case { paths: Some(paths), ..of(glass) };
+    for case in [
+        Case { is_studio: true, ..of(Glass::Absorbing) },
+        Case { is_mapped: true, has_motion: true, ..of(Glass::Colored) },
+        of_paths(Glass::Absorbing, Paths::Look),
+        Case { clamp: Some(0.1), ..of_paths(Glass::Smooth, Paths::Lights) },
+        Case { is_mapped: true, radii: Radii::Each, ..of_paths(Glass::Colored, Paths::Catcher) },
+        of_paths(Glass::Rough, Paths::Look),
+    ] {
+        let found = support::compare(&mut renderer, &case, level);
+        let Difference { ids, depths, normals, mean, bias, odd, ray_ratio, .. } = found;
+        assert_eq!([ids, depths, normals], [0; 3], "{case:?}");
+        assert!(mean.max(bias).max(odd) < 1e-3, "{case:?}: {found:?}");
+        assert!((ray_ratio - 1.0).abs() < 1e-3, "{case:?}: {found:?}");
     }
 }
 

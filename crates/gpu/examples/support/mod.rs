@@ -19,8 +19,8 @@ use spherule_tracer::scene::environment::{
 };
 use spherule_tracer::scene::ground::{Ground, Pattern};
 use spherule_tracer::scene::{
-    Background, Camera, CameraView, ColorMap, Exposure, Finish, Lens, Light, LightKind, MaterialId,
-    Projection, Scene, default_lights,
+    Background, Camera, CameraView, ColorMap, Exposure, Finish, Fresnel, Lens, Light, LightKind,
+    Material, MaterialId, Projection, Scene, default_lights,
 };
 use spherule_tree::accel::moving::MovingTree;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
@@ -64,6 +64,34 @@ pub(crate) enum Opacity {
     Each,
     /// Those of the second half, which are a style.
     Style(f32),
+}
+
+/// Transmissive particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Glass {
+    /// Without roughness, clear.
+    Smooth,
+    /// The same; what it absorbs differs between red, green and blue.
+    Absorbing,
+    /// The same; the colour of each particle is that of its light after a short way.
+    Colored,
+    /// Rough.
+    Rough,
+}
+
+impl Glass {
+    fn apply(self, material: &mut Material) {
+        material.transmission = 1.0;
+        material.reflection = 1.0;
+        material.ior = 1.5;
+        material.fresnel = Fresnel::Exact;
+        match self {
+            Self::Smooth => {}
+            Self::Absorbing => material.extinction = Vec3::new(2.0, 5.0, 9.0),
+            Self::Colored => material.color_length = Some(0.1),
+            Self::Rough => material.interface_roughness = 0.3,
+        }
+    }
 }
 
 /// What pictures of path tracing have beside the studio around the particles.
@@ -144,6 +172,8 @@ pub(crate) struct Case {
     pub(crate) has_motion: bool,
     /// Limit of indirect light.
     pub(crate) clamp: Option<f32>,
+    /// Whether particles are transmissive.
+    pub(crate) glass: Option<Glass>,
 }
 
 impl Case {
@@ -168,6 +198,7 @@ impl Case {
             has_layers: false,
             has_motion: false,
             clamp: None,
+            glass: None,
         }
     }
 
@@ -208,6 +239,7 @@ impl Case {
             seed: self.seed,
             max_depth: self.max_depth,
             clamp: self.clamp,
+            photons: 0,
             channels,
             window: self.window.map(|[left, top]| DataWindow {
                 image: [self.width, self.height],
@@ -220,10 +252,11 @@ impl Case {
 }
 
 /// Planes with parts of the light.
-const LAYERS: [FilmPlane; 11] = [
+const LAYERS: [FilmPlane; 12] = [
     FilmPlane::Diffuse,
     FilmPlane::Specular,
     FilmPlane::Reflection,
+    FilmPlane::Refraction,
     FilmPlane::Emission,
     FilmPlane::Background,
     FilmPlane::Direct,
@@ -332,6 +365,9 @@ impl Particles {
 /// A scene: the camera of the thesis, turned by `angle` radians. If it moves, it turns.
 pub(crate) fn scene(case: &Case, angle: f64) -> Scene {
     let mut scene = still_scene(case, angle);
+    if let Some(glass) = case.glass {
+        glass.apply(&mut scene.materials[MaterialId::PARTICLES.index()]);
+    }
     if case.has_motion {
         let at = |part: f64| still_scene(case, angle + part).camera;
         scene.exposure = Some(Exposure { cameras: [at(-0.01), at(0.02)], slices: 1 });
@@ -613,7 +649,7 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
     });
     let odd_means = |film: &Film| film.odd.clone().unwrap_or_default();
     let odd = odd_means(&found).into_iter().zip(odd_means(&expected));
-    let secondary = |rays: RayCounts| (rays.shadow + rays.reflection) as f64;
+    let secondary = |rays: RayCounts| (rays.shadow + rays.reflection + rays.refraction) as f64;
     Difference {
         mean: sum(&distance) / total,
         bias: (sum(&|a, _| rgb(a)) / total - 1.0).abs(),

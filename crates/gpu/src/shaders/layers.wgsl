@@ -18,8 +18,17 @@ const BY_ARRIVAL: u32 = 5u;
 const BY_LOSS: u32 = 6u;
 // The diffuse part of the reflection at the first surface of the path that is being traced
 const FIRST_REFLECTION: u32 = 7u;
+// By the first interaction again: of glass
+const BY_REFLECTION: u32 = 8u;
+const BY_REFRACTION: u32 = 9u;
 // By group
-const FIRST_GROUP: u32 = 8u;
+const FIRST_GROUP: u32 = 10u;
+
+// First interactions of paths: none yet, glass reflects or refracts the camera ray, or an opaque surface reflects it
+const NOTHING_FIRST: u32 = 0u;
+const REFLECTION_FIRST: u32 = 1u;
+const REFRACTION_FIRST: u32 = 2u;
+const BOUNCE_FIRST: u32 = 3u;
 
 fn layer_place(layer: u32, pixel: u32) -> u32 { return layer * view.width * view.height + pixel; }
 
@@ -48,24 +57,31 @@ fn add_limited_layers(pixel: u32, part: f32) {
   }
 }
 
-// Adds light of a group that the first surface reflects, with the diffuse part of that.
-fn add_reflected(pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>, is_limited: bool) {
+// Adds light of a group that the first surface reflects or refracts; `diffuse`: the diffuse part if it is opaque.
+fn add_after(first: u32, pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>, is_limited: bool) {
   if (!HAS_LAYERS) { return; }
-  add_to_layer(BY_DIFFUSE, pixel, diffuse * light, is_limited);
-  add_to_layer(BY_SPECULAR, pixel, light - diffuse * light, is_limited);
+  if (first == REFLECTION_FIRST) {
+    add_to_layer(BY_REFLECTION, pixel, light, is_limited);
+  } else if (first == REFRACTION_FIRST) {
+    add_to_layer(BY_REFRACTION, pixel, light, is_limited);
+  } else {
+    add_to_layer(BY_DIFFUSE, pixel, diffuse * light, is_limited);
+    add_to_layer(BY_SPECULAR, pixel, light - diffuse * light, is_limited);
+  }
   add_to_layer(FIRST_GROUP + group, pixel, light, is_limited);
 }
 
 // Adds light of a group that a ray sees, not that of a surface. `of_camera`: its layer if that is a camera ray.
-fn add_seen(pixel: u32, of_camera: u32, group: u32, light: vec3<f32>) {
+fn add_seen(pixel: u32, of_camera: u32, group: u32, light: vec3<f32>, state: State) {
   if (!HAS_LAYERS) { return; }
-  if (stage.depth == 1u) {
+  let depth = depth_along(state);
+  if (depth == 1u) {
     add_to_layer(of_camera, pixel, light, false);
     add_to_layer(FIRST_GROUP + group, pixel, light, false);
   } else {
-    add_reflected(pixel, group, light, first_reflection(pixel), stage.depth > 2u);
+    add_after(first_of(state), pixel, group, light, first_reflection(pixel), bounces_of(state) > 1u);
   }
-  if (stage.depth <= 2u) { add_to_layer(BY_DIRECT, pixel, light, false); }
+  if (depth <= 2u) { add_to_layer(BY_DIRECT, pixel, light, false); }
 }
 
 fn first_reflection(pixel: u32) -> vec3<f32> { return layers[layer_place(FIRST_REFLECTION, pixel)].xyz; }

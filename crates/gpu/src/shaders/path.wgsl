@@ -5,12 +5,13 @@
 // ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights.
 //
 // A ray that goes on has its direction and density, and its throughput beside its origin; also the diffuse part of that
-// if mirrors see the environment through a shadow catcher (HAS_MIRRORS). A shadow ray has its direction and length, and
+// if mirrors see the environment through a shadow catcher (HAS_MIRRORS), and where it is in its path if spheres are clear
+// (`glass.wgsl`). A shadow ray has its direction and length, and
 // its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage. With
 // layers of light, shadow rays from first surfaces have parts: the diffuse part of the reflection (of a catcher: the part of
 // the light that is lost), and the luminance.
 
-const RAY: u32 = select(3u, 4u, HAS_MIRRORS);
+const RAY: u32 = 3u + select(0u, 1u, HAS_MIRRORS) + select(0u, 1u, HAS_GLASS);
 const SHADOW: u32 = select(3u, 4u, HAS_LAYERS);
 
 // Sources of shadow rays; those of the lights follow, then those of a catcher that mirrors see
@@ -18,7 +19,7 @@ const OF_ENVIRONMENT: u32 = 0u;
 const OF_LAST: u32 = 1u;
 const FIRST_LIGHT: u32 = 2u;
 
-// In place of a coverage: the ray adds light if nothing blocks it
+// In place of a coverage, numbers from this one down: the ray adds light if nothing blocks it (`role_at`)
 const ADDS: f32 = -1.0;
 
 // Reflections from which on paths end at random, and the largest probability of going on
@@ -33,9 +34,6 @@ const LOST_STEPS: f32 = 4096.0;
 const MAX_LOST: f32 = 1.8e19;
 
 const LUMINANCE: vec3<f32> = vec3<f32>(0.2126, 0.7152, 0.0722);
-
-// A path up to a ray. `diffuse` is the part of its throughput from the diffuse reflection before.
-struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32>, diffuse: vec3<f32> }
 
 // A point of an opaque surface
 struct Vertex { normal: vec3<f32>, start: vec3<f32>, base: vec3<f32>, out: vec3<f32>, finish: Finish }
@@ -60,6 +58,11 @@ fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
   }
 }
 
+// What rays see beyond the last depth
+fn seen_at_end(direction: vec3<f32>) -> vec3<f32> { return environment_along(direction, FAR); }
+
+fn group_at_end() -> u32 { return scene.environment_group; }
+
 // The light of a sample that a surface reflects. `competes`: rays of the BSDF find that light, too.
 fn reflected(vertex: Vertex, weight: vec3<f32>, light: LightSample, competes: bool) -> vec3<f32> {
   let value = eval_bsdf(vertex.finish, vertex.base, vertex.normal, vertex.out, light.direction);
@@ -68,13 +71,23 @@ fn reflected(vertex: Vertex, weight: vec3<f32>, light: LightSample, competes: bo
   return weight * (value.xyz * (light.radiance * factor));
 }
 
-fn shadow_of(vertex: Vertex, light: LightSample, radiance: vec3<f32>) -> Shadow {
+// What a ray that adds light at a surface tells: whether it is indirect light, which a clamp limits, and the first
+// interaction of its path.
+fn role_at(state: State) -> f32 {
+  return ADDS - f32(select(0u, 1u, bounces_of(state) > 0u) + 2u * first_of(state));
+}
+
+fn is_indirect(role: f32) -> bool { return (u32(ADDS - role) & 1u) == 1u; }
+
+fn first_in(role: f32) -> u32 { return u32(ADDS - role) >> 1u; }
+
+fn shadow_of(vertex: Vertex, light: LightSample, radiance: vec3<f32>, state: State) -> Shadow {
   let is_needed = largest_of(radiance) > 0.0;
   var parts = vec4<f32>(0.0);
   if (HAS_LAYERS && stage.depth == 1u && is_needed) {
     parts = vec4<f32>(diffuse_along(vertex, light.direction), dot(radiance, LUMINANCE));
   }
-  return Shadow(is_needed, vertex.start, light.direction, light.distance, radiance, ADDS, parts);
+  return Shadow(is_needed, vertex.start, light.direction, light.distance, radiance, role_at(state), parts);
 }
 
 fn diffuse_along(vertex: Vertex, direction: vec3<f32>) -> vec3<f32> {
@@ -89,7 +102,7 @@ fn sample_source(number: u32, vertex: Vertex, seed: Wide) -> LightSample {
 }
 
 // What a ray sees of lights before a surface at distance `t`, or beyond all: of rays that a BSDF chose, weighted against
-// the sampling of the light; a camera ray ends at the nearest visible light, which covers the pixel.
+// the sampling of the light; a ray that no BSDF chose ends at the nearest visible light, which covers the pixel.
 struct Emitted { light: vec3<f32>, ends: bool }
 
 fn emitted_along(is_ray: bool, ray: Ray, path: Path, t: f32) -> Emitted {
@@ -97,17 +110,19 @@ fn emitted_along(is_ray: bool, ray: Ray, path: Path, t: f32) -> Emitted {
   var group = 0u;
   if (!is_ray) { return Emitted(sum, false); }
   var nearest_light = FAR;
+  // Behind clear spheres, only shadow rays find lights
+  let is_sampled = path.pdf < FAR && !HAS_GLASS;
   var ends = false;
   for (var number = 0u; number < view.light_count; number++) {
     let light = view.lights[number];
-    let is_seen = stage.depth == 1u && light.is_visible == 1u;
-    if (!has_extent(light) || !(path.pdf < FAR || is_seen)) { continue; }
+    let is_seen = bounces_of(path.state) == 0u && light.is_visible == 1u;
+    if (!has_extent(light) || !(is_sampled || is_seen)) { continue; }
     let found = hit_light(light, ray);
     if (!found.is_hit || !(found.t < t || t >= FAR)) { continue; }
-    if (path.pdf < FAR) {
+    if (is_sampled) {
       let arriving = path.throughput * (balance(path.pdf, found.pdf) * light.radiance);
       sum += arriving;
-      add_seen(path.pixel, BY_EMISSION, light.group, arriving);
+      add_seen(path.pixel, BY_EMISSION, light.group, arriving, path.state);
     } else if (!ends || found.t < nearest_light) {
       sum = path.throughput * light.radiance;
       group = light.group;
@@ -115,7 +130,7 @@ fn emitted_along(is_ray: bool, ray: Ray, path: Path, t: f32) -> Emitted {
       ends = true;
     }
   }
-  if (ends) { add_seen(path.pixel, BY_EMISSION, group, sum); }
+  if (ends) { add_seen(path.pixel, BY_EMISSION, group, sum, path.state); }
   return Emitted(sum, ends);
 }
 
@@ -175,27 +190,25 @@ fn catch_shadows(
 }
 
 // The light of a second surface at a distance from the first, where the path ends: an estimate (`path/ambient.rs`).
-fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide, pixel: u32) -> vec3<f32> {
+fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide, pixel: u32, role: f32) -> vec3<f32> {
   let arriving = weight * (MAX_AMBIENT * (t / (t + scene.reach)));
   var sum = vec3<f32>(0.0);
   if (scene.environment.side > 0u) {
     sum = arriving * vertex.base * irradiance_at(vertex.normal) * INVERSE_PI;
-    add_of_path(pixel, scene.environment_group, sum);
+    add_arriving(pixel, scene.environment_group, sum, vec3<f32>(1.0), role);
   }
   for (var number = 0u; number < view.light_count; number++) {
     let light = reflected(vertex, arriving, sample_source(number, vertex, seed), false);
     sum += light;
-    add_of_path(pixel, view.lights[number].group, light);
+    add_arriving(pixel, view.lights[number].group, light, vec3<f32>(1.0), role);
   }
   return sum;
 }
 
-// The next ray of a path
-struct Next { is_ray: bool, direction: vec3<f32>, throughput: vec3<f32>, pdf: f32 }
-
-fn next_ray(vertex: Vertex, weight: vec3<f32>, seed: Wide) -> Next {
+fn next_ray(vertex: Vertex, weight: vec3<f32>, seed: Wide, state: State) -> Next {
   let sample = sample_bsdf(vertex.finish, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, current.sample));
-  return Next(sample.pdf > 0.0, sample.direction, weight * sample.weight, sample.pdf);
+  let is_ray = sample.pdf > 0.0;
+  return Next(is_ray, vertex.start, sample.direction, weight * sample.weight, sample.pdf, bounced(state));
 }
 
 // Ends long paths at random, and makes up for it.
@@ -203,7 +216,7 @@ fn roulette(next: Next, bounces: u32, seed: Wide) -> Next {
   if (bounces < ROULETTE_START) { return next; }
   let chance = min(largest_of(next.throughput), MAX_CONTINUATION);
   let goes_on = number_1d(seed, CONTINUATION, current.sample) < chance;
-  return Next(next.is_ray && goes_on, next.direction, next.throughput / chance, next.pdf);
+  return Next(next.is_ray && goes_on, next.origin, next.direction, next.throughput / chance, next.pdf, next.state);
 }
 
 // The light group of what is behind everything
@@ -213,19 +226,15 @@ fn group_behind() -> u32 {
 
 // Adds light of a group that arrives at a surface, to the layers; `diffuse`: the diffuse part of the reflection, if it is
 // the first surface.
-fn add_arriving(pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>) {
+fn add_arriving(pixel: u32, group: u32, light: vec3<f32>, diffuse: vec3<f32>, role: f32) {
   if (!HAS_LAYERS) { return; }
-  if (stage.depth > 1u) {
-    add_of_path(pixel, group, light);
+  let first = first_in(role);
+  if (first != NOTHING_FIRST) {
+    add_after(first, pixel, group, light, first_reflection(pixel), is_indirect(role));
     return;
   }
-  add_reflected(pixel, group, light, diffuse, false);
+  add_after(BOUNCE_FIRST, pixel, group, light, diffuse, false);
   add_to_layer(BY_DIRECT, pixel, light, false);
-}
-
-// Adds light of a group that later surfaces reflect.
-fn add_of_path(pixel: u32, group: u32, light: vec3<f32>) {
-  if (HAS_LAYERS) { add_reflected(pixel, group, light, first_reflection(pixel), true); }
 }
 
 // The light group of a source of shadow rays from surfaces
@@ -235,13 +244,13 @@ fn group_of(source: u32) -> u32 {
 }
 
 // Adds what a shadow ray brings to the layers; `part` of it. A catcher darkens what is behind it.
-fn add_shadow_parts(pixel: u32, light: vec3<f32>, adds: bool, part: f32, parts: vec4<f32>) {
-  if (adds) {
-    add_arriving(pixel, group_of(stage.source), light, parts.xyz);
+fn add_shadow_parts(pixel: u32, light: vec3<f32>, role: f32, part: f32, parts: vec4<f32>) {
+  if (role <= ADDS) {
+    add_arriving(pixel, group_of(stage.source), light, parts.xyz, role);
     add_arrival(pixel, 0.0, part * parts.w);
     return;
   }
-  add_seen(pixel, BY_BACKGROUND, group_behind(), light);
+  add_seen(pixel, BY_BACKGROUND, group_behind(), light, camera_state(pixel));
   if (stage.depth == 1u) { add_to_layer(BY_LOSS, pixel, part * parts.xyz, false); }
   add_arrival(pixel, 0.0, -part * parts.w);
 }
@@ -251,8 +260,8 @@ fn indirect_place(pixel: u32) -> u32 { return (1u + view.has_odd) * view.width *
 
 // Adds the light along a ray. A clamp limits what it brings to its first surface, but `direct`; that stays apart until
 // its shadow rays are traced.
-fn add_light(pixel: u32, light: vec4<f32>, direct: vec4<f32>) {
-  if (!HAS_CLAMP || stage.depth == 1u) {
+fn add_light(pixel: u32, light: vec4<f32>, direct: vec4<f32>, bounces: u32) {
+  if (!HAS_CLAMP || bounces == 0u) {
     add_to_film(pixel, light);
     return;
   }
@@ -264,16 +273,16 @@ fn add_light(pixel: u32, light: vec4<f32>, direct: vec4<f32>) {
 fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   var sum = vec4<f32>(0.0);
   let is_first = stage.depth == 1u;
-  let bounces = stage.depth - 1u;
+  let bounces = bounces_of(path.state);
   let t = select(ground.t, hit.t, hit.slot != MISS);
   // Lights, which may end the ray
   let emitted = emitted_along(is_ray, ray, path, t);
-  sum += vec4<f32>(emitted.light, select(0.0, 1.0, emitted.ends));
+  sum += vec4<f32>(emitted.light, select(0.0, 1.0, emitted.ends && is_first));
   let is_open = is_ray && !emitted.ends;
   let is_sphere = is_open && hit.slot != MISS;
   let is_ground = is_open && hit.slot == MISS && ground.t < FAR;
   var seed = Wide(0u);
-  if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces, BOUNCED); }
+  if (is_sphere || is_ground) { seed = seed_of(path.pixel, path.state); }
   // A catcher shows its shadows only
   let is_caught = is_first && is_ground && scene.is_catcher == 1u;
   // Before the light: behind it, the compiler of an NVIDIA driver (580.159) loses the light of spheres
@@ -292,7 +301,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
       seen = uncovered * path.throughput * environment_along(ray.direction, pdf);
     }
     sum += vec4<f32>(seen, 0.0);
-    add_seen(path.pixel, BY_BACKGROUND, group_behind(), seen);
+    add_seen(path.pixel, BY_BACKGROUND, group_behind(), seen, path.state);
   }
   // A glossy reflection sees the environment through a catcher
   var weight = path.throughput;
@@ -301,15 +310,16 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   if (is_passed) {
     behind = ground.opacity * weight * (1.0 - path.diffuse) * environment_along(ray.direction, FAR);
     sum += vec4<f32>(behind, 0.0);
-    add_seen(path.pixel, BY_BACKGROUND, scene.environment_group, behind);
+    add_seen(path.pixel, BY_BACKGROUND, scene.environment_group, behind, path.state);
     weight *= path.diffuse;
   }
   // The first surface reflects this light, which has no limit
-  let direct = select(vec4<f32>(0.0), sum, stage.depth == 2u);
+  let direct = select(vec4<f32>(0.0), sum, bounces == 1u);
   // The point of the surface
   var vertex: Vertex;
+  var surface: Surface;
   if (is_sphere) {
-    let surface = surface_at(ray, hit);
+    surface = surface_at(ray, hit);
     vertex = Vertex(surface.normal, surface.start, base_color(hit.index), -ray.direction, finish_of(hit.index));
     if (is_first) { keep_nearest(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, path.pixel); }
   } else if (is_ground) {
@@ -329,9 +339,10 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     catch_shadows(is_caught || is_passed, ground, ray, behind, darkness, path.pixel, seed);
   }
   let is_mirror = is_passed && largest_of(path.diffuse) == 0.0;
-  var is_shaded = (is_sphere || is_ground) && !is_caught && !is_mirror && bounces <= scene.bounces;
+  let is_opaque = (is_sphere && !HAS_GLASS) || is_ground;
+  var is_shaded = is_opaque && !is_caught && !is_mirror && bounces <= scene.bounces;
   if (is_shaded && scene.is_ambient == 1u && bounces > 0u) {
-    sum += vec4<f32>(ambient_light(vertex, weight, t, seed, path.pixel), 0.0);
+    sum += vec4<f32>(ambient_light(vertex, weight, t, seed, path.pixel, role_at(path.state)), 0.0);
     is_shaded = false;
   }
   // Light of the environment
@@ -339,7 +350,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   if (is_shaded && scene.environment.side > 0u) {
     let sample = sample_table(scene.environment, numbers_2d(seed, ENVIRONMENT, current.sample));
     let light = LightSample(sample.direction, FAR, sample.radiance, sample.pdf);
-    shadow = shadow_of(vertex, light, reflected(vertex, weight, light, true));
+    shadow = shadow_of(vertex, light, reflected(vertex, weight, light, true), path.state);
   }
   push_shadow(OF_ENVIRONMENT, shadow, path.pixel);
   // Luminance of direct light: if nothing is in the way, and what arrives without a shadow ray
@@ -351,12 +362,12 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     if (is_shaded) {
       let source = view.lights[number];
       let light = sample_source(number, vertex, seed);
-      let radiance = reflected(vertex, weight, light, has_extent(source));
-      shadow = shadow_of(vertex, light, radiance);
+      let radiance = reflected(vertex, weight, light, has_extent(source) && !HAS_GLASS);
+      shadow = shadow_of(vertex, light, radiance, path.state);
       whole += shadow.parts.w;
       if (shadow.is_needed && source.casts_shadow == 0u) {
         sum += vec4<f32>(radiance, 0.0);
-        add_arriving(path.pixel, source.group, radiance, shadow.parts.xyz);
+        add_arriving(path.pixel, source.group, radiance, shadow.parts.xyz, shadow.coverage);
         unshadowed += shadow.parts.w;
         shadow.is_needed = false;
       }
@@ -365,35 +376,45 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   }
   if (is_shaded) { add_arrival(path.pixel, whole, unshadowed); }
   // Go on in a direction of the BSDF; the last segment may be a shadow ray to the environment
-  var next = Next(false, vec3<f32>(0.0), vec3<f32>(0.0), 0.0);
+  var next = no_ray(path.state);
   shadow = no_shadow();
   if (is_shaded) {
-    next = next_ray(vertex, weight, seed);
+    next = next_ray(vertex, weight, seed, path.state);
     next.is_ray = next.is_ray && largest_of(next.throughput) > 0.0;
     var diffuse = vec3<f32>(1.0);
     if (HAS_LAYERS && is_first && next.is_ray) { diffuse = diffuse_along(vertex, next.direction); }
     keep_first_reflection(path.pixel, diffuse);
-    if (bounces == scene.bounces && view.has_extents == 0u) {
+    if (!HAS_GLASS && bounces == scene.bounces && view.has_extents == 0u) {
       let radiance = next.throughput * environment_along(next.direction, next.pdf);
       let is_needed = next.is_ray && largest_of(radiance) > 0.0;
-      shadow = Shadow(is_needed, vertex.start, next.direction, FAR, radiance, ADDS, vec4<f32>(diffuse, 0.0));
+      let role = role_at(path.state);
+      shadow = Shadow(is_needed, vertex.start, next.direction, FAR, radiance, role, vec4<f32>(diffuse, 0.0));
       next.is_ray = false;
     } else {
       next = roulette(next, bounces, seed);
     }
   }
   push_shadow(OF_LAST, shadow, path.pixel);
+  // Clear spheres reflect and refract rays; where a path ends, one that was kept goes on
+  if (HAS_GLASS && is_sphere) {
+    let scattered = scatter(path, absorbed(path, ray, hit, surface), ray, surface);
+    sum += vec4<f32>(scattered.seen, 0.0);
+    next = scattered.next;
+  }
+  if (is_ray && !next.is_ray && has_kept(path.state)) { next = take_kept(path.pixel, path.state); }
+  count_refracted(next);
   let place = append(queue_of(stage.depth), next.is_ray);
   if (next.is_ray) {
-    next_rays[RAY * place] = vec4<f32>(vertex.start, bitcast<f32>(path.pixel));
+    next_rays[RAY * place] = vec4<f32>(next.origin, bitcast<f32>(path.pixel));
     next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
     if (HAS_MIRRORS) {
       next_rays[RAY * place + 3u] = vec4<f32>(diffuse_along(vertex, next.direction), 0.0);
     }
+    store_state(place, next.state);
   }
   if (is_ray) {
-    add_light(path.pixel, sum, direct);
+    add_light(path.pixel, sum, direct, bounces);
   }
 }
 
@@ -402,7 +423,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
 fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
   let is_ray = id.x < view.width && id.y < view.height;
   let pixel = id.y * view.width + id.x;
-  var path = Path(vec3<f32>(1.0), FAR, pixel, vec2<f32>(0.0), vec3<f32>(1.0));
+  var path = camera_path(pixel, vec2<f32>(0.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
@@ -430,14 +451,16 @@ fn trace_next(
 ) {
   let i = linear_index(group, groups, local, GROUP);
   let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
-  var path = Path(vec3<f32>(0.0), FAR, 0u, vec2<f32>(0.0), vec3<f32>(1.0));
+  var path = camera_path(0u, vec2<f32>(0.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
   if (is_ray) {
     let origin = rays[RAY * i];
     let direction = rays[RAY * i + 1u];
-    path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0), vec3<f32>(1.0));
+    let throughput = rays[RAY * i + 2u].xyz;
+    let pixel = bitcast<u32>(origin.w);
+    path = Path(throughput, direction.w, pixel, vec2<f32>(0.0), vec3<f32>(1.0), stored_state(i));
     ray = Ray(origin.xyz, direction.xyz, time_of(path.pixel));
     if (HAS_MIRRORS) { path.diffuse = rays[RAY * i + 3u].xyz; }
     ground = hit_ground(ray);
@@ -462,14 +485,16 @@ fn trace_shadow(
   let pixel = bitcast<u32>(start.w);
   let ray = Ray(start.xyz, into.xyz, time_of(pixel));
   var passing = 0.0;
-  if (!is_below_ground(ray, into.w)) { passing = transmittance(ray, into.w); }
-  let adds = light.w == ADDS;
+  let adds = light.w <= ADDS;
+  // Light of the environment that reaches a surface through glass is found by its paths
+  let is_straight = !(adds && stage.source < FIRST_LIGHT);
+  if (!is_below_ground(ray, into.w)) { passing = transmittance(ray, into.w, is_straight); }
   let part = select(1.0 - passing, passing, adds);
   if (part == 0.0) { return; }
   let coverage = part * select(0.0, light.w, !adds && view.transparent == 1u);
-  if (HAS_LAYERS) { add_shadow_parts(pixel, part * light.xyz, adds, part, shadows[place + 3u]); }
+  if (HAS_LAYERS) { add_shadow_parts(pixel, part * light.xyz, light.w, part, shadows[place + 3u]); }
   // What the first surface reflects of a catcher has no limit
-  if (HAS_CLAMP && stage.depth > select(2u, 1u, adds)) {
+  if (HAS_CLAMP && ((adds && is_indirect(light.w)) || (!adds && stage.depth > 2u))) {
     film[indirect_place(pixel)] += vec4<f32>(part * light.xyz, 0.0);
   } else {
     add_to_film(pixel, vec4<f32>(part * light.xyz, coverage));
@@ -494,6 +519,7 @@ fn clamp_indirect(
 ) {
   let i = linear_index(group, groups, local, GROUP);
   if (i >= atomicLoad(&queued[queue_of(stage.depth - 1u)])) { return; }
+  if (bounces_of(stored_state(i)) == 0u) { return; }
   let pixel = bitcast<u32>(rays[RAY * i].w);
   let light = film[indirect_place(pixel)];
   let largest = largest_of(light.xyz);

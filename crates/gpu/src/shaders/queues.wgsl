@@ -30,8 +30,9 @@
 // Invocations of a workgroup that follows a queue
 const GROUP: u32 = 64u;
 
-// What differs between the dispatches of a sample. `depth` counts from 1.
-struct Stage { depth: u32, source: u32, counters: u32, zero: u32 }
+// What differs between the dispatches of a sample. `depth` counts from 1. `last` is the queue of the last depth if rays go
+// on behind it, or 0.
+struct Stage { depth: u32, source: u32, counters: u32, last: u32 }
 
 // What differs between samples
 struct Current { sample: u32, zero: u32, zero_too: u32, zero_three: u32 }
@@ -41,7 +42,7 @@ const GROUND: u32 = 0xfffffffeu;
 
 // The number of the queue of the rays that go on from a depth; those of its shadow rays follow, source by source.
 fn queue_of(depth: u32) -> u32 {
-  return (depth - 1u) * (1u + view.sources);
+  return (depth - 1u) * view.queues;
 }
 
 // The place of the first shadow ray to a source
@@ -80,12 +81,15 @@ fn keep_nearest(depth: f32, index: u32, normal: vec3<f32>, point: vec3<f32>, pix
   }
 }
 
-// Empties all queues before a sample, and adds up their lengths.
+// Empties all queues, and adds up their lengths. The rays behind the last depth are those of the first queue then, and
+// counted with it.
 @compute @workgroup_size(GROUP)
 fn empty_queues(@builtin(global_invocation_id) id: vec3<u32>) {
   let counter = id.x;
-  if (counter >= stage.counters) { return; }
-  let count = atomicExchange(&queued[counter], 0u);
+  if (counter >= stage.counters || (counter > 0u && counter == stage.last)) { return; }
+  var rest = 0u;
+  if (counter == 0u && stage.last > 0u) { rest = atomicExchange(&queued[stage.last], 0u); }
+  let count = atomicExchange(&queued[counter], rest);
   let sum = sums[2u * counter] + count;
   sums[2u * counter + 1u] += select(0u, 1u, sum < count);
   sums[2u * counter] = sum;

@@ -37,8 +37,10 @@ fn mix_wide(state: Wide) -> Wide {
 
 // Continuations of a path, and dimensions at one of its vertices or of a segment
 const REFLECTED: u32 = 0u;
+const REFRACTED: u32 = 1u;
 const BOUNCED: u32 = 2u;
 const CAMERA: u32 = 3u;
+const BRANCH: u32 = 0u;
 const CONTINUATION: u32 = 1u;
 const BSDF: u32 = 2u;
 const ENVIRONMENT: u32 = 3u;

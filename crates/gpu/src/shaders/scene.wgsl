@@ -20,6 +20,8 @@ struct SceneUniform {
   // The image at its own resolution: its size, and a factor on its radiance; the light group of the environment
   detail_scale: vec3<f32>, is_ambient: u32,
   detail_size: vec2<u32>, environment_group: u32, zero: u32,
+  // Microfacets of rough glass: their width, and the tables of the light that leaves it from outside and from inside
+  glass_alpha: f32, glass_table: u32, glass_zero: u32, glass_zero_too: u32,
   // How spheres reflect light, by the first index of each group
   finishes: array<Finish, 65>,
   // Irradiance of the environment

@@ -1,9 +1,7 @@
 // Points of spheres, their colours, and what is behind them.
 
-// Base colours of the spheres, `COLOR` numbers each: the fourth is the opacity
+// Base colours of the spheres, `COLOR` numbers each: a fourth is the opacity
 @group(0) @binding(12) var<storage, read> colors: array<f32>;
-
-const COLOR: u32 = select(3u, 4u, HAS_OPACITY);
 
 const OFFSET_OF_RADIUS: f32 = 1e-4;
 // Eight units in the last place of 1
@@ -38,9 +36,11 @@ fn base_color(index: u32) -> vec3<f32> {
 
 fn opacity_of(index: u32) -> f32 { return colors[COLOR * index + 3u]; }
 
-struct Surface { point: vec3<f32>, normal: vec3<f32>, start: vec3<f32>, is_entering: bool }
+struct Surface {
+  point: vec3<f32>, normal: vec3<f32>, start: vec3<f32>, inner: vec3<f32>, is_entering: bool,
+}
 
-// The point of an intersection, the normal on the side of the ray, and where rays to other surfaces start.
+// The point of an intersection, the normal on the side of the ray, and where rays start on this side and on the other.
 fn surface_at(ray: Ray, hit: Hit) -> Surface {
   let sphere = sphere_at(hit.slot, ray.time);
   let radius = radius_of(sphere);
@@ -56,5 +56,6 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
   let offset = max(OFFSET_OF_RADIUS * radius, rounding);
   let is_entering = dot_in_order(ray.direction, normal) < 0.0;
   let facing = select(-normal, normal, is_entering);
-  return Surface(point, facing, point + scaled(facing, offset), is_entering);
+  let step = scaled(facing, offset);
+  return Surface(point, facing, point + step, point - step, is_entering);
 }

@@ -4,7 +4,10 @@
 // passes it in a straight line; shadow rays are attenuated by all that they enter. Spheres in which a ray starts do not
 // count then.
 //
-// Files that include this one define `view: View` with the fields used here, and `fn opacity_of(index: u32) -> f32`.
+// Light passes clear spheres (HAS_GLASS) in a straight line.
+//
+// Files that include this one define `view: View` with the fields used here, `fn opacity_of(index: u32) -> f32`, and
+// `fn straight_transmittance(cosine: f32) -> f32`.
 // Spheres move or not, by `moving.wgsl` or `still.wgsl`.
 
 @group(0) @binding(1) var<storage, read> nodes: array<vec4<u32>>;
@@ -15,6 +18,8 @@ const MISS: u32 = 0xffffffffu;
 const FAR: f32 = 3.4e38;
 // Transmittance below which a shadow ray ends
 const DARK: f32 = 1.0 / 4096.0;
+// The same behind clear spheres: 2^-32
+const CLEAR_DARK: f32 = 2.3283064365386963e-10;
 // Rounding of the box test, relative to the distances in it
 const SLAB_SLACK: f32 = 1e-6;
 
@@ -205,8 +210,25 @@ fn nearest(ray: Ray, limit: f32, u: f32) -> Hit {
   return hit;
 }
 
-// The part of the light that the spheres before `limit` let through.
-fn transmittance(ray: Ray, limit: f32) -> f32 {
+// The part of the light that passes a sphere straight through, at the points of the ray before `limit`.
+fn passing_sphere(slot: u32, ray: Ray, limit: f32) -> f32 {
+  let sphere = sphere_at(slot, ray.time);
+  let to_center = sphere.xyz - ray.origin;
+  let middle = test_dot(to_center, ray.direction);
+  let across = test_minus(to_center, middle, ray.direction);
+  let radius = radius_of(sphere);
+  let discriminant = mul(radius, radius) - test_dot(across, across);
+  if (!(discriminant >= 0.0)) { return 1.0; }
+  let half = root(discriminant);
+  let part = straight_transmittance(half / radius);
+  var product = 1.0;
+  if (middle - half >= 0.0 && middle - half < limit) { product *= part; }
+  if (middle + half >= 0.0 && middle + half < limit) { product *= part; }
+  return product;
+}
+
+// The part of the light that the spheres before `limit` let through. `is_straight`: light passes clear ones.
+fn transmittance(ray: Ray, limit: f32, is_straight: bool) -> f32 {
   let p = prepare(ray);
   var product = 1.0;
   // First child and the mask of the children that are left
@@ -219,6 +241,11 @@ fn transmittance(ray: Ray, limit: f32) -> f32 {
     if (level == 0u) {
       for (var j = 0u; j < BLOCK; j++) {
         let slot = index * BLOCK + j;
+        if (HAS_GLASS && is_straight) {
+          product *= passing_sphere(slot, ray, limit);
+          if (product < CLEAR_DARK) { return 0.0; }
+          continue;
+        }
         let t = distance_to(sphere_at(slot, ray.time), ray);
         if (!(t >= 0.0 && t < limit)) { continue; }
         if (!HAS_OPACITY) { return 0.0; }

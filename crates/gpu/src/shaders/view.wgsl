@@ -49,6 +49,11 @@ struct View {
   ambient: vec3<f32>, diffuse: f32,
   color: vec3<f32>, specular: f32,
   shininess: f32, reflection: f32, ior: f32, is_exact_fresnel: u32,
+  // Clear spheres: what their medium absorbs, and the weight of the refracted ray. The least weight of a path that both rays
+  // continue; the length in a medium after which the colour of its sphere is left, or 0; how many rays a pixel keeps; and
+  // the number of queues at each depth
+  extinction: vec3<f32>, transmission: f32,
+  split_weight: f32, color_length: f32, kept: u32, queues: u32,
   // The camera when the shutter opens and when it closes
   open: CameraAt,
   close: CameraAt,

@@ -2,28 +2,16 @@
 //
 // Rays are computed with the operations of the CPU, so that they meet the same spheres; colours are not, so that they
 // may differ in the last bits. The sources of shadow rays are the lights. A ray that goes on has its direction and
-// throughput beside its origin; a shadow ray has its radiance beside its start.
+// throughput beside its origin, and where it is in its path if spheres are clear; a shadow ray has its radiance beside its
+// start.
 
-const RAY: u32 = 2u;
+const RAY: u32 = select(2u, 4u, HAS_GLASS);
 const SHADOW: u32 = 2u;
 
-// The Fresnel reflectance of a ray from outside or inside: Schlick's approximation, or that of a dielectric.
-fn fresnel(cosine: f32, is_entering: bool) -> f32 {
-  let c = clamp(cosine, 0.0, 1.0);
-  let ratio = select(view.ior, 1.0 / view.ior, is_entering);
-  let sin2 = ratio * ratio * (1.0 - c * c);
-  if (sin2 >= 1.0) { return 1.0; }
-  if (view.is_exact_fresnel == 0u) {
-    let at_normal = (1.0 - view.ior) / (1.0 + view.ior);
-    let r0 = at_normal * at_normal;
-    let x = 1.0 - c;
-    return r0 + (1.0 - r0) * (x * x * x * x * x);
-  }
-  let inner = sqrt(1.0 - sin2);
-  let parallel = (c - ratio * inner) / (c + ratio * inner);
-  let perpendicular = (ratio * c - inner) / (ratio * c + inner);
-  return 0.5 * (parallel * parallel + perpendicular * perpendicular);
-}
+// What rays see beyond the last depth
+fn seen_at_end(direction: vec3<f32>) -> vec3<f32> { return background(direction); }
+
+fn group_at_end() -> u32 { return 0u; }
 
 // The direction to the light from `start`, and the distance.
 fn toward(source: Light, start: vec3<f32>) -> vec4<f32> {
@@ -34,7 +22,7 @@ fn toward(source: Light, start: vec3<f32>) -> vec4<f32> {
 }
 
 // Eq. 4.2: the light that a surface reflects, by the model of Blinn and Phong.
-fn blinn_phong(normal: vec3<f32>, out: vec3<f32>, into: vec3<f32>, albedo: vec3<f32>, weight: f32) -> vec3<f32> {
+fn blinn_phong(normal: vec3<f32>, out: vec3<f32>, into: vec3<f32>, albedo: vec3<f32>, weight: vec3<f32>) -> vec3<f32> {
   let cosine = dot_in_order(normal, into);
   if (!(cosine > 0.0)) { return vec3<f32>(0.0); }
   var highlight = 0.0;
@@ -44,21 +32,50 @@ fn blinn_phong(normal: vec3<f32>, out: vec3<f32>, into: vec3<f32>, albedo: vec3<
     let along = select(1.0, dot(normal, half_vector * scale), scale <= FAR);
     highlight = view.specular * select(pow(clamp(along, 0.0, 1.0), view.shininess), 1.0, view.shininess == 0.0);
   }
-  return (view.diffuse * cosine) * albedo + vec3<f32>(highlight * weight);
+  return (view.diffuse * cosine) * albedo + highlight * weight;
+}
+
+// The ray that an opaque sphere reflects.
+fn mirrored(path: Path, ray: Ray, surface: Surface) -> Next {
+  let cosine = -dot_in_order(ray.direction, surface.normal);
+  let ratio = select(view.ior, inverse(view.ior), surface.is_entering);
+  let weight = path.throughput * (view.reflection * fresnel_of(cosine, ratio).reflectance);
+  let along = ray.direction + scaled(surface.normal, 2.0 * cosine);
+  let direction = scaled(along, inverse(root(dot_in_order(along, along))));
+  return Next(weight.x > 0.0, surface.start, direction, weight, FAR, path.state);
+}
+
+// Without glass, the throughput is grey.
+fn store_ray(place: u32, next: Next, pixel: u32) {
+  next_rays[RAY * place] = vec4<f32>(next.origin, bitcast<f32>(pixel));
+  next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.throughput.x);
+  if (HAS_GLASS) {
+    next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
+    store_state(place, next.state);
+  }
+}
+
+// The path up to a ray of the depth before
+fn stored_path(i: u32) -> Path {
+  var throughput = vec3<f32>(rays[RAY * i + 1u].w);
+  if (HAS_GLASS) { throughput = rays[RAY * i + 2u].xyz; }
+  let pixel = bitcast<u32>(rays[RAY * i].w);
+  return Path(throughput, FAR, pixel, vec2<f32>(0.0), vec3<f32>(1.0), stored_state(i));
 }
 
 // Adds what a ray sees without shadows, and appends the rays that leave its intersection.
-fn follow(is_ray: bool, ray: Ray, throughput: f32, pixel: u32, hit: Hit, on_film: vec2<f32>) {
+fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
   var sum = vec4<f32>(0.0);
   var surface: Surface;
   var albedo = vec3<f32>(0.0);
-  var reflected = 0.0;
-  var direction = vec3<f32>(0.0);
+  var throughput = path.throughput;
+  var next = no_ray(path.state);
+  let pixel = path.pixel;
   let is_hit = is_ray && hit.slot != MISS;
   if (is_ray && !is_hit && stage.depth > 1u) {
-    sum = vec4<f32>(throughput * background(ray.direction), 0.0);
+    sum = vec4<f32>(path.throughput * background(ray.direction), 0.0);
   } else if (is_ray && !is_hit && view.transparent == 0u) {
-    sum = vec4<f32>(backdrop(ray.direction, on_film), 0.0);
+    sum = vec4<f32>(backdrop(ray.direction, path.on_film), 0.0);
   }
   if (is_hit) {
     surface = surface_at(ray, hit);
@@ -66,27 +83,28 @@ fn follow(is_ray: bool, ray: Ray, throughput: f32, pixel: u32, hit: Hit, on_film
       sum.w = 1.0;
       keep_nearest(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, pixel);
     }
+    throughput = absorbed(path, ray, hit, surface);
     // Ambient light
     albedo = throughput * clamp(base_color(hit.index), vec3<f32>(0.0), vec3<f32>(1.0));
     sum += vec4<f32>(albedo * view.ambient, 0.0);
-    // The reflected ray, which sees the background beyond the last depth
-    if (view.reflection > 0.0) {
-      let cosine = -dot_in_order(ray.direction, surface.normal);
-      reflected = throughput * (view.reflection * fresnel(cosine, surface.is_entering));
-      let mirrored = ray.direction + scaled(surface.normal, 2.0 * cosine);
-      direction = scaled(mirrored, inverse(root(dot_in_order(mirrored, mirrored))));
+    // The rays that leave it
+    if (HAS_GLASS) {
+      let scattered = scatter(path, throughput, ray, surface);
+      sum += vec4<f32>(scattered.seen, 0.0);
+      next = scattered.next;
+    } else if (view.reflection > 0.0) {
+      next = mirrored(path, ray, surface);
       if (stage.depth >= view.max_depth) {
-        sum += vec4<f32>(reflected * background(direction), 0.0);
-        reflected = 0.0;
+        sum += vec4<f32>(next.throughput * background(next.direction), 0.0);
+        next.is_ray = false;
       }
     }
   }
+  if (is_ray && !next.is_ray && has_kept(path.state)) { next = take_kept(pixel, path.state); }
   let queue = queue_of(stage.depth);
-  let place = append(queue, reflected > 0.0);
-  if (reflected > 0.0) {
-    next_rays[RAY * place] = vec4<f32>(surface.start, bitcast<f32>(pixel));
-    next_rays[RAY * place + 1u] = vec4<f32>(direction, reflected);
-  }
+  count_refracted(next);
+  let place = append(queue, next.is_ray);
+  if (next.is_ray) { store_ray(place, next, pixel); }
   // The light of each source, or its shadow ray
   for (var number = 0u; number < view.light_count; number++) {
     let source = view.lights[number];
@@ -120,15 +138,15 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
   let pixel = id.y * view.width + id.x;
   var ray: Ray;
   var hit = Hit(0.0, MISS, MISS);
-  var on_film = vec2<f32>(0.0);
+  var path = camera_path(pixel, vec2<f32>(0.0));
   if (is_ray) {
     if (current.sample == 0u) { clear_pixel(pixel); }
-    on_film = film_position(id.x, id.y, current.sample);
-    ray = camera_ray(on_film, time_of(pixel));
-    on_film = seen_on_film(on_film, ray.time);
+    path.on_film = film_position(id.x, id.y, current.sample);
+    ray = camera_ray(path.on_film, time_of(pixel));
+    path.on_film = seen_on_film(path.on_film, ray.time);
     hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
   }
-  follow(is_ray, ray, 1.0, pixel, hit, on_film);
+  follow(is_ray, ray, path, hit);
 }
 
 // The rays that were reflected at the depth before.
@@ -141,18 +159,14 @@ fn trace_next(
   let i = linear_index(group, groups, local, GROUP);
   let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
   var ray: Ray;
-  var throughput = 0.0;
-  var pixel = 0u;
+  var path = camera_path(0u, vec2<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
   if (is_ray) {
-    let origin = rays[RAY * i];
-    let direction = rays[RAY * i + 1u];
-    throughput = direction.w;
-    pixel = bitcast<u32>(origin.w);
-    ray = Ray(origin.xyz, direction.xyz, time_of(pixel));
-    hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
+    path = stored_path(i);
+    ray = Ray(rays[RAY * i].xyz, rays[RAY * i + 1u].xyz, time_of(path.pixel));
+    hit = nearest(ray, FAR, number_of_end(path.pixel, REFLECTED));
   }
-  follow(is_ray, ray, throughput, pixel, hit, vec2<f32>(0.0));
+  follow(is_ray, ray, path, hit);
 }
 
 // Adds the light of a source that arrives at the surfaces of a depth.
@@ -168,7 +182,7 @@ fn trace_shadow(
   let start = shadows[SHADOW * place];
   let into = toward(view.lights[stage.source], start.xyz);
   let pixel = bitcast<u32>(start.w);
-  let passing = transmittance(Ray(start.xyz, into.xyz, time_of(pixel)), into.w);
+  let passing = transmittance(Ray(start.xyz, into.xyz, time_of(pixel)), into.w, true);
   if (passing > 0.0) {
     add_to_film(pixel, vec4<f32>(passing * shadows[SHADOW * place + 1u].xyz, 0.0));
   }

@@ -8,9 +8,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use super::bsdf::rough_table;
+pub use super::interface::rough_glass_table;
 pub use super::lights::{Extent, extent_of};
 pub use super::path::ambient::reach as ambient_reach;
 pub use super::path::catcher::{light_on, mirrors_see_through, reflected_by_white};
+pub use super::path::ground::needs_photons;
 
 use super::{
     aov::{DataSample, NO_ID},
@@ -69,6 +71,10 @@ pub struct DeviceLight {
     pub diffuse: Vec3,
     /// Of the glossy reflection by the first surface.
     pub specular: Vec3,
+    /// Of the reflection by transmissive particles.
+    pub reflection: Vec3,
+    /// Of the refraction by transmissive particles.
+    pub refraction: Vec3,
     /// Of lights that the camera sees.
     pub emission: Vec3,
     /// Of what the camera sees behind everything.
@@ -89,7 +95,7 @@ pub trait DevicePixels: Sync {
     /// The objects of the samples, without those that show neither a particle nor the ground. For Cryptomatte.
     fn objects(&self, number: usize) -> impl Iterator<Item = DeviceObject>;
 
-    /// The light by parts, of opaque scenes. Only if [`needs_light_parts`].
+    /// The light by parts. Only if [`needs_light_parts`].
     fn light(&self, number: usize) -> DeviceLight;
 
     /// The mean light of a light group; group 0 has the light without a group. Only if [`needs_light_parts`].
@@ -200,8 +206,8 @@ impl RenderContext<'_> {
         for (plane, value) in [
             (FilmPlane::Diffuse, light.diffuse),
             (FilmPlane::Specular, light.specular),
-            (FilmPlane::Reflection, Vec3::ZERO),
-            (FilmPlane::Refraction, Vec3::ZERO),
+            (FilmPlane::Reflection, light.reflection),
+            (FilmPlane::Refraction, light.refraction),
             (FilmPlane::Emission, light.emission),
             (FilmPlane::Background, light.background + limited),
             (FilmPlane::Direct, direct),

@@ -20,6 +20,7 @@ use body::BodyInterface;
 pub(super) use boundaries::BoundaryTable;
 pub(super) use dielectric::{Dielectric, attenuate, cross_straight, leaving};
 use rough::RoughInterface;
+pub use rough::rough_glass_table;
 use spheres::SphereInterface;
 
 /// The rays that leave the intersections of a packet.

@@ -52,6 +52,15 @@ impl RoughInterface {
     }
 }
 
+/// Width of the microfacets of separate spheres of a transmissive `material`, and the fractions of light that leave their
+/// surface after one of them, for cosines from 0 to 1, evenly spaced, with their mean: for light from outside, then for
+/// light from inside. None if they are smooth.
+pub fn rough_glass_table(material: &Material) -> Option<(f32, Vec<f32>)> {
+    let interface = RoughInterface::of(material, false)?;
+    let numbers = interface.passing.iter().flat_map(Albedo::table).collect();
+    Some((interface.ggx.width(), numbers))
+}
+
 impl Interface for RoughInterface {
     fn dielectric(&self) -> &Dielectric {
         &self.dielectric

@@ -184,6 +184,11 @@ fn has_photons(scene: &Scene, settings: &RenderSettings) -> bool {
         && scene.materials.iter().any(is_clear)
 }
 
+/// Whether a picture has light that photons, or maps of the light on the ground, bring.
+pub fn needs_photons(scene: &Scene, settings: &RenderSettings) -> bool {
+    bytes(scene, settings) != GroundLightBytes::default()
+}
+
 /// Whether particles with this material are transmissive.
 fn is_clear(material: &Material) -> bool {
     matches!(material.owner, Owner::Particles | Owner::Style(_)) && material.transmission > 0.0
