@@ -305,7 +305,7 @@ impl RenderJob {
         let survey = findings.survey(sequence, question)?;
         let mut setup = self.setup(&survey, sequence)?;
         if self.manifest.render.device == DeviceSetting::Auto {
-            match gpu::suits(&setup, survey.most_particles as u64) {
+            match gpu::suits(&setup, sequence, survey.most_particles as u64) {
                 Ok(()) => setup.picture.renderer = RendererKind::Gpu,
                 Err(why) => setup.run.why_cpu = why,
             }

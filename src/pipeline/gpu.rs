@@ -5,11 +5,14 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use spherule_files::memory::MemoryUse;
+use spherule_formats::native::{self, NativeFile};
+use spherule_formats::sequence::Sequence;
 use spherule_gpu::{
-    AdapterSummary, Arithmetic, Checks, Cost, Device, GpuError, MAX_FINISHES, Missing, SceneError,
-    SceneRenderer, bytes_per_pixel, largest_array, missing, ray_counts, spheres_within, tree_bytes,
+    AdapterSummary, Arithmetic, Checks, Cost, Device, Encoding, GpuError, MAX_FINISHES, Missing,
+    SceneError, SceneRenderer, TreeNeed, bytes_per_pixel, largest_array, missing, ray_counts,
 };
 
+use super::in_place::particles_in_place;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::mattes;
 use super::motion::expose;
@@ -166,11 +169,46 @@ fn is_plain(setup: &Setup, style: &ParticleStyle) -> bool {
         && (is_traced || constants(own) == constants(usual))
 }
 
+/// How positions are stored in frame `index`, and whether its radii are equal, if it is a native frame that is traced in
+/// place.
+fn stored_as(setup: &Setup, sequence: &Sequence, index: usize) -> Option<(Encoding, bool)> {
+    let file = NativeFile::open(sequence.native_file(index)?, setup.run.access).ok()?;
+    let radius = particles_in_place(setup, file.index()).ok()?;
+    let code = file.index().encoding;
+    let found = native::Encoding::ALL.into_iter().find(|encoding| encoding.code() == code)?;
+    let encoding = match found {
+        native::Encoding::F32 => Encoding::Blocks,
+        native::Encoding::Q16 => Encoding::Q16,
+        native::Encoding::Q10 => Encoding::Q10,
+    };
+    Some((encoding, radius.common.is_some()))
+}
+
+/// What the memory for `particles` of the largest frame depends on: frames that are traced in place stay coded if they are
+/// large, and if all of them are.
+fn need_of(setup: &Setup, sequence: &Sequence, particles: u64) -> TreeNeed {
+    let rules = &setup.picture.particles;
+    let decoded = TreeNeed {
+        count: particles,
+        is_common: matches!(rules.first().radius, RadiusRule::Common(_)) && !rules.is_divided(),
+        has_motion: setup.has_motion(),
+        encoding: Encoding::Points,
+    };
+    let stored = |index| stored_as(setup, sequence, index);
+    let Some(first) = stored(0) else { return decoded };
+    let is_small = particles <= u64::from(u32::MAX) / 64;
+    if !is_small && (1..sequence.frames().len()).any(|index| stored(index) != Some(first)) {
+        return decoded;
+    }
+    let (encoding, is_common) = first;
+    TreeNeed { is_common, encoding, ..decoded }
+}
+
 /// Whether a job that may choose its device is rendered on a GPU; `particles` are those of its largest frame.
 ///
 /// # Errors
 /// The first reason why it is not; nothing if the program has no renderer for GPUs.
-pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
+pub fn suits(setup: &Setup, sequence: &Sequence, particles: u64) -> Result<(), Option<String>> {
     // Look for a device only if it could be used
     if let Some((key, what)) = lacking(setup) {
         return Err(Some(format!("{key}: {what} cannot be rendered on a GPU yet")));
@@ -183,18 +221,21 @@ pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
     if *is_software {
         return Err(Some(format!("{name} is a program on the CPU")));
     }
-    let most = spheres_within(*max_array);
+    let most = need_of(setup, sequence, particles).most_within(*max_array);
     if particles > most {
         return Err(Some(format!("a frame has {particles} particles, and {name} takes {most}")));
     }
     let picture = &setup.picture;
+    let of_colors = bytes_of_color(setup) * particles;
     let largest = largest_array(&picture.scene, &picture.render).max(detail_bytes(setup));
-    if largest > *max_array {
-        return Err(Some(format!(
-            "a picture has an array of {} MiB, and {name} takes {} MiB",
-            largest >> 20,
-            max_array >> 20,
-        )));
+    for (what, bytes) in [("picture", largest), ("frame", of_colors)] {
+        if bytes > *max_array {
+            return Err(Some(format!(
+                "a {what} has an array of {} MiB, and {name} takes {} MiB",
+                bytes >> 20,
+                max_array >> 20,
+            )));
+        }
     }
     Ok(())
 }
@@ -221,24 +262,27 @@ fn detail_bytes(setup: &Setup) -> u64 {
     environment.and_then(Environment::detail).map_or(0, |(map, _)| map.byte_len())
 }
 
-/// Memory of the device for a frame with that many particles, bytes.
-pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
-    let picture = &setup.picture;
-    let rules = &picture.particles;
-    let is_common = matches!(rules.first().radius, RadiusRule::Common(_)) && !rules.is_divided();
-    let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
-    let has_colors = rules.first().color.is_by_particle() || rules.is_divided();
+/// Memory of the device for the colour of a particle, bytes.
+fn bytes_of_color(setup: &Setup) -> u64 {
+    let rules = &setup.picture.particles;
     let is_opaque = |style: &ParticleStyle| style.opacity == OpacityRule::OPAQUE;
-    let bytes_of_color = if !rules.styles.iter().all(is_opaque) {
+    if !rules.styles.iter().all(is_opaque) {
         16
-    } else if has_colors {
+    } else if rules.first().color.is_by_particle() || rules.is_divided() {
         12
     } else {
         0
-    };
+    }
+}
+
+/// Memory of the device for a frame with that many particles, bytes.
+pub fn device_bytes(setup: &Setup, sequence: &Sequence, particles: u64) -> u64 {
+    let picture = &setup.picture;
+    let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
     let of_pixels = bytes_per_pixel(&picture.scene, &picture.render) * pixels;
-    tree_bytes(particles, is_common, setup.has_motion())
-        + bytes_of_color * particles
+    let max_array = device().map_or(u64::MAX, |device| device.adapter().max_array);
+    need_of(setup, sequence, particles).bytes(max_array)
+        + bytes_of_color(setup) * particles
         + of_pixels
         + detail_bytes(setup)
 }

@@ -326,15 +326,18 @@ impl<'a> Columns<'a> {
 }
 
 /// Radii of a frame that is traced in place.
-struct PlacedRadius {
+pub(super) struct PlacedRadius {
     /// Common radius; None if each particle has its own.
-    common: Option<f32>,
+    pub(super) common: Option<f32>,
     /// Number of radii raised to the minimum.
     raised: u64,
 }
 
 /// The radii of a frame if it can be traced in place, otherwise the reason why not.
-fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius, String> {
+pub(super) fn particles_in_place(
+    setup: &Setup,
+    index: &FrameIndex,
+) -> Result<PlacedRadius, String> {
     // Check that neither settings nor origin require a copy
     if let Some(why) = setup.needs_copy() {
         return Err(why);

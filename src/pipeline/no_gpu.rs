@@ -4,6 +4,7 @@ use super::load::LoadedFrame;
 use super::renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 use super::setup::Setup;
 use crate::render::{Film, RayCounts, Stop};
+use spherule_formats::sequence::Sequence;
 
 /// Why there is no GPU, and what to do.
 const NOT_BUILT: &str = "this program was built without the renderer for GPUs: build it with \
@@ -31,12 +32,16 @@ pub fn lacking(_setup: &Setup) -> Option<(&'static str, String)> {
 ///
 /// # Errors
 /// Always, without a reason: nothing about the job is in the way.
-pub const fn suits(_setup: &Setup, _particles: u64) -> Result<(), Option<String>> {
+pub const fn suits(
+    _setup: &Setup,
+    _sequence: &Sequence,
+    _particles: u64,
+) -> Result<(), Option<String>> {
     Err(None)
 }
 
 /// No memory.
-pub const fn device_bytes(_setup: &Setup, _particles: u64) -> u64 {
+pub const fn device_bytes(_setup: &Setup, _sequence: &Sequence, _particles: u64) -> u64 {
     0
 }
 

@@ -3,7 +3,8 @@
 use crate::Device;
 use crate::commands::Kernel;
 use crate::picture::Picture;
-use crate::tree::{GROUPS, TreeShape, tree_constants};
+use crate::spheres::Encoding;
+use crate::tree::{CODED_CENTERS, GROUPS, TreeShape, encoding_constant, tree_constants};
 
 /// Entries of the traversal's stack for each level of nodes: all children but the one that is visited next.
 const STACK_PER_LEVEL: u32 = 7;
@@ -48,6 +49,8 @@ pub(crate) struct Variant {
     is_common: bool,
     /// Whether spheres and the camera move while the shutter is open.
     has_motion: bool,
+    /// How centres are stored that stay coded.
+    kept_encoding: Option<Encoding>,
     /// Levels that the stack holds.
     levels: u32,
 }
@@ -83,6 +86,7 @@ impl Variant {
             is_rough: picture.has_rough_glass(),
             is_common: shape.is_common,
             has_motion: shape.has_motion,
+            kept_encoding: shape.kept_encoding(),
             levels: shape.levels.max(MIN_STACK_LEVELS),
         }
     }
@@ -108,7 +112,9 @@ impl Variant {
 
 impl Kernels {
     /// Compiles the kernels.
-    pub(crate) fn new(device: &Device, variant: Variant) -> Self {
+    ///
+    /// `part` is the constant that divides coded centres between two arrays.
+    pub(crate) fn new(device: &Device, variant: Variant, part: &str) -> Self {
         let append = if device.has_subgroups() {
             include_str!("shaders/append_subgroup.wgsl")
         } else {
@@ -125,10 +131,21 @@ impl Kernels {
             (true, true) => &ROUGH_GLASS,
         };
         let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
+        let spheres = match variant.kept_encoding {
+            None => include_str!("shaders/decoded_spheres.wgsl").to_owned(),
+            Some(encoding) => [
+                part,
+                &encoding_constant(encoding),
+                CODED_CENTERS,
+                include_str!("shaders/coded_spheres.wgsl"),
+            ]
+            .concat(),
+        };
         let source = [
             device.arithmetic().source(),
             &tree_constants(variant.is_common),
             motion,
+            &spheres,
             &variant.constants(),
             GROUPS,
             include_str!("shaders/view.wgsl"),
@@ -150,24 +167,29 @@ impl Kernels {
         let module = device.module(&source.concat());
         let kernel = |entry, bindings: &[u32]| Kernel::new(device, &module, entry, bindings);
         let of_motion: &[u32] = if variant.has_motion { &[22] } else { &[] };
+        let of_spheres: &[u32] = match variant.kept_encoding {
+            None => &[2, 3],
+            Some(_) => &[24, 25, 26, 27],
+        };
         // Rays that glass ends see the background, which is a part of the light
         let [of_glass, of_next]: [&[u32]; 2] = match (variant.has_glass, variant.has_paths) {
             (false, _) => [&[], &[]],
             (true, true) => [&[23], &[23]],
             (true, false) => [&[23], &[21, 23]],
         };
-        let tracing = |entry, bindings: &[u32]| kernel(entry, &[bindings, of_motion].concat());
+        let tracing =
+            |entry, bindings: &[u32]| kernel(entry, &[bindings, of_spheres, of_motion].concat());
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
             [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
-                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 15, 18, 21],
+                &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
+                &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
+                &[0, 1, 6, 8, 11, 12, 13, 15, 18, 21],
             ]
         } else {
             [
-                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20, 21],
-                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
-                &[0, 1, 2, 3, 6, 8, 11, 12, 13, 18],
+                &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20, 21],
+                &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
+                &[0, 1, 6, 8, 11, 12, 13, 18],
             ]
         };
         Self {

@@ -30,6 +30,7 @@
 //!     radii: Radii::Common(0.8),
 //!     order: Order::Any(KeyLength::Short),
 //!     displacements: None,
+//!     keeps_codes: false,
 //!     keeps_copies: false,
 //! };
 //! renderer.prepare(&device, &spheres, Colors::Constant([0.8, 0.2, 0.1]))?;
@@ -117,4 +118,4 @@ pub use pixels::{Cost, LightLayer, NearestSample, Pixels, SampleObject};
 pub use renderer::{Colors, Renderer, bytes_per_pixel, largest_array};
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
-pub use tree::{MAX_SPHERES, spheres_within, tree_bytes};
+pub use tree::{MAX_SPHERES, TreeNeed};

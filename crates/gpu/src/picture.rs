@@ -46,6 +46,47 @@ pub struct Picture<'a> {
     pub lights: &'a [Light],
 }
 
+#[cfg(test)]
+impl<'a> Picture<'a> {
+    /// A picture of what is between 0 and 3 on all axes, from outside, with one sample in the middle of pixels.
+    pub(crate) fn for_tests([width, height]: [u32; 2], sets: &'a [u32]) -> Self {
+        Self {
+            camera: Camera {
+                eye: [1.5, -4.0, 1.5],
+                axes: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]],
+                half_extent: [0.5, 0.5 * height as f32 / width as f32],
+                size: [width as f32, height as f32],
+                is_parallel: false,
+                lens: None,
+            },
+            exposure: None,
+            film: FilmSize { width, height, corner: [0, 0] },
+            samples: Samples { count: 1, points: &[[0.5, 0.5]], sets, seed: 0 },
+            has_odd: false,
+            has_objects: false,
+            light_groups: None,
+            model: Model::Whitted,
+            max_depth: 1,
+            background: Background::Constant([0.0; 3]),
+            is_transparent: false,
+            material: Material {
+                ambient: [0.1; 3],
+                diffuse: 0.9,
+                specular: 0.0,
+                shininess: 1.0,
+                reflection: 0.0,
+                ior: 1.5,
+                is_exact_fresnel: false,
+                transmission: 0.0,
+                extinction: [0.0; 3],
+                color_length: None,
+            },
+            split_weight: 1.0,
+            lights: &[],
+        }
+    }
+}
+
 impl Picture<'_> {
     /// Whether paths are traced.
     pub(crate) const fn has_paths(&self) -> bool {
@@ -305,6 +346,9 @@ pub(crate) struct View {
     pub(crate) color_length: f32,
     pub(crate) kept: u32,
     pub(crate) queues: u32,
+    pub(crate) sphere_count: u32,
+    pub(crate) wide_count: u32,
+    pub(crate) zeros: [u32; 2],
     pub(crate) open: CameraUniform,
     pub(crate) close: CameraUniform,
     pub(crate) lights: [LightUniform; MAX_LIGHTS],

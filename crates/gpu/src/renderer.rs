@@ -233,6 +233,12 @@ impl Renderer {
         }
     }
 
+    /// The tree.
+    #[cfg(test)]
+    pub(crate) fn tree_mut(&mut self) -> &mut TreeBuilder {
+        &mut self.tree
+    }
+
     /// Copies a frame to the device, and starts to build its tree.
     ///
     /// # Errors
@@ -286,7 +292,8 @@ impl Renderer {
         let shape = *self.tree.shape();
         assert_eq!(shape.has_motion, picture.exposure.is_some(), "both move, or none");
         let variant = Variant::of(picture, &shape, self.has_opacity);
-        self.kernels.entry(variant).or_insert_with(|| Kernels::new(device, variant));
+        let part = self.tree.part_constant();
+        self.kernels.entry(variant).or_insert_with(|| Kernels::new(device, variant, &part));
         let plan = self.plan(picture, &shape);
         self.uniforms.upload(device)?;
         // Trace sample by sample
@@ -484,6 +491,8 @@ impl Renderer {
             radius: shape.radius,
             padding: shape.padding,
             starts: shape.starts,
+            sphere_count: u32::try_from(shape.count).expect("at most MAX_SPHERES"),
+            wide_count: u32::try_from(shape.wide_count).expect("fewer than spheres"),
             color_kind: self.has_colors.into(),
             color: self.color,
             ..View::new(picture)

@@ -30,6 +30,7 @@ use crate::renderer::{Colors, Renderer, light_groups_of};
 use crate::scene_lighting::SceneLighting;
 use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
 use crate::stored::{centers_of, grids_of};
+use crate::tree::TreeNeed;
 use crate::{Device, GpuError};
 
 /// What the device lacks of the renderer for CPUs.
@@ -190,7 +191,8 @@ impl SceneRenderer {
         let centers = Centers::Points(bytemuck::cast_slice(spheres.centers));
         let keeps_copies = source.is_translucent();
         let displacements = displacements.map(bytemuck::cast_slice);
-        let all = Spheres { centers, radii, order, displacements, keeps_copies };
+        let all =
+            Spheres { centers, radii, order, displacements, keeps_copies, keeps_codes: false };
         self.start(&all, spheres.centers.len(), source)
     }
 
@@ -216,11 +218,21 @@ impl SceneRenderer {
                 Radii::PerSphere(&each)
             }
         };
+        // Frames that are too large for the arrays of the device stay coded
+        let centers = centers_of(leaves, &grids);
+        let need = TreeNeed {
+            count: leaves.count,
+            is_common: radius.is_some(),
+            has_motion: false,
+            encoding: centers.encoding(),
+        };
+        let keeps_codes = need.keeps_codes(self.device.adapter().max_array);
         let spheres = Spheres {
-            centers: centers_of(leaves, &grids),
+            centers,
             radii,
             order: Order::AlongCurve,
             displacements: None,
+            keeps_codes,
             keeps_copies: source.is_translucent(),
         };
         let count = usize::try_from(leaves.count).unwrap_or(usize::MAX);

@@ -12,6 +12,9 @@ pub struct Spheres<'a> {
     /// By how far each sphere moves from the opening of the shutter to its closing, around its centre; there may be more. For
     /// pictures with an exposure.
     pub displacements: Option<&'a [[f32; 3]]>,
+    /// Whether coded centres stay coded, and each ray decodes those that it tests: less memory, but slower. Only if all radii
+    /// are equal, and without displacements.
+    pub keeps_codes: bool,
     /// Whether rays find all spheres with the same place and radius, instead of the first one.
     pub keeps_copies: bool,
 }
@@ -58,6 +61,17 @@ pub enum Encoding {
     Q16,
     /// 11, 11 and 10 bits.
     Q10,
+}
+
+impl Encoding {
+    /// Words of 16 centres.
+    pub(crate) const fn words(self) -> u64 {
+        match self {
+            Self::Points | Self::Blocks => 48,
+            Self::Q16 => 24,
+            Self::Q10 => 16,
+        }
+    }
 }
 
 impl Centers<'_> {

@@ -57,6 +57,7 @@ mod tests {
     use crate::Device;
     use crate::spheres::{Order, Radii, Spheres};
     use crate::tree::TreeBuilder;
+    use crate::{Colors, NearestSample, Picture, Renderer};
 
     /// Nodes with grids that differ, from a fixed sequence.
     fn nodes(count: usize) -> Vec<Node> {
@@ -103,7 +104,14 @@ mod tests {
         for radii in [Radii::Common(0.1), Radii::PerSphere(&vec![0.2; 1000])] {
             let centers = centers_of(leaves, &grids);
             let (order, displacements) = (Order::AlongCurve, None);
-            let spheres = Spheres { centers, radii, order, displacements, keeps_copies: true };
+            let spheres = Spheres {
+                centers,
+                radii,
+                order,
+                displacements,
+                keeps_codes: false,
+                keeps_copies: true,
+            };
             builder.build(device, &spheres, None).unwrap();
             let content = builder.content(device).unwrap();
             for index in 0..usize::try_from(leaves.count).unwrap() {
@@ -114,9 +122,8 @@ mod tests {
         }
     }
 
-    #[test]
-    fn coded_blocks_are_decoded_to_the_bits_of_the_host() {
-        let Some(device) = Device::for_tests() else { return };
+    /// Calls `each` with the leaves of two encodings.
+    fn each_encoding(mut each: impl FnMut(&StoredLeaves<'_>)) {
         let nodes = nodes(4);
         let place = |i: usize| std::array::from_fn(|lane| (100 * i + lane) as f32 / 3.0);
         let wide: Vec<Block> =
@@ -126,8 +133,48 @@ mod tests {
             StoredBlocks::Q10(CompactBlocks { blocks: &q10, wide: &wide }),
             StoredBlocks::Q16(CompactBlocks { blocks: &q16, wide: &wide }),
         ] {
-            let radii = StoredRadii::None;
-            check(&device, &StoredLeaves { count: 475, nodes: &nodes, blocks, radii });
+            each(&StoredLeaves { count: 475, nodes: &nodes, blocks, radii: StoredRadii::None });
         }
+    }
+
+    #[test]
+    fn coded_blocks_are_decoded_to_the_bits_of_the_host() {
+        let Some(device) = Device::for_tests() else { return };
+        each_encoding(|leaves| check(&device, leaves));
+    }
+
+    /// The pixels of a picture of `leaves`, which stay coded or not.
+    fn pixels(device: &Device, leaves: &StoredLeaves<'_>, keeps_codes: bool) -> Vec<NearestSample> {
+        let grids = grids_of(leaves);
+        let mut renderer = Renderer::new(device);
+        // Arrays hold ten blocks, of which four are looked at together
+        renderer.tree_mut().divide(240, 8);
+        let spheres = Spheres {
+            centers: centers_of(leaves, &grids),
+            radii: Radii::Common(0.2),
+            order: Order::AlongCurve,
+            displacements: None,
+            keeps_codes,
+            keeps_copies: true,
+        };
+        renderer.prepare(device, &spheres, Colors::Constant([0.5; 3])).unwrap();
+        let picture = Picture::for_tests([64, 48], &[0; 64 * 48]);
+        renderer.trace(device, &picture, &|| false).unwrap();
+        renderer.read(device, |pixels| pixels.nearest.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn blocks_that_stay_coded_give_the_same_picture() {
+        let Some(device) = Device::for_tests() else { return };
+        each_encoding(|leaves| {
+            let [decoded, coded] = [false, true].map(|keeps| pixels(&device, leaves, keeps));
+            let hits = decoded.iter().filter(|pixel| pixel.index != NearestSample::NONE).count();
+            assert!(hits > 100, "{hits}");
+            let bits = |pixel: &NearestSample| -> [u32; 8] { bytemuck::cast(*pixel) };
+            let is_hit = |pixel: &&NearestSample| pixel.index != NearestSample::NONE;
+            assert!(decoded.iter().zip(&coded).all(|(a, b)| a.index == b.index));
+            let [a, b] = [&decoded, &coded].map(|all| all.iter().filter(is_hit).map(bits));
+            assert!(a.eq(b));
+        });
     }
 }

@@ -10,7 +10,7 @@ use wgpu::BindingResource;
 
 use crate::arrays::{Array, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel, Timer};
-use crate::spheres::{Centers, Encoding, KeyLength, Order, Radii, Spheres};
+use crate::spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
 use crate::{Device, GpuError};
 
 /// Spheres in a block, the constant `BLOCK` of the shaders.
@@ -26,7 +26,7 @@ pub const MAX_SPHERES: u64 = BLOCK << 28;
 const BYTES_OF_SPHERE: u64 = 16;
 
 /// Number of spheres whose tree has no array larger than so many bytes.
-pub const fn spheres_within(max_array: u64) -> u64 {
+pub(crate) const fn spheres_within(max_array: u64) -> u64 {
     let count = max_array / BYTES_OF_SPHERE;
     if count < MAX_SPHERES { count } else { MAX_SPHERES }
 }
@@ -53,7 +53,16 @@ pub(crate) struct TreeShape {
     /// How the centres are stored.
     encoding: Encoding,
     /// Number of blocks that are not coded.
-    wide_count: u64,
+    pub(crate) wide_count: u64,
+    /// Whether centres stay coded.
+    keeps_codes: bool,
+}
+
+impl TreeShape {
+    /// How centres are stored that stay coded.
+    pub(crate) fn kept_encoding(&self) -> Option<Encoding> {
+        self.keeps_codes.then_some(self.encoding)
+    }
 }
 
 /// A uniform of the kernels.
@@ -70,13 +79,16 @@ struct Build {
     radius: f32,
     keeps_copies: u32,
     wide_count: u32,
-    zeros: [u32; 2],
+    blocks_before: u32,
+    nodes_before: u32,
+    zeros: [u32; 4],
 }
 
 /// What kernels for keys depend on: the length, and how centres are stored. Only centres in any order have keys.
 type KeyVariant = (KeyLength, Encoding);
-/// What kernels for nodes depend on: whether radii are equal, how centres are stored, and whether spheres move.
-type NodeVariant = (bool, Encoding, bool);
+/// What kernels for nodes depend on: whether radii are equal, how centres are stored, whether they stay coded, and whether
+/// spheres move.
+type NodeVariant = (bool, Encoding, bool, bool);
 
 /// Kernels for keys of one length.
 #[derive(Debug)]
@@ -128,20 +140,36 @@ impl SortKernels {
 /// Kernels that build nodes, for spheres with a common radius or one for each.
 #[derive(Debug)]
 struct NodeKernels {
-    gather_spheres: Kernel,
+    /// Unless spheres stay coded.
+    gather_spheres: Option<Kernel>,
     block_boxes: Kernel,
     build_level: Kernel,
 }
 
 impl NodeKernels {
-    fn new(device: &Device, (is_common, encoding, has_motion): NodeVariant) -> Self {
+    fn new(
+        device: &Device,
+        (is_common, encoding, keeps_codes, has_motion): NodeVariant,
+        part: &str,
+    ) -> Self {
         let is_coded = matches!(encoding, Encoding::Q16 | Encoding::Q10);
         let motion = format!("const HAS_MOTION: bool = {has_motion};\n");
         let centers = if is_coded {
-            [device.arithmetic().source(), ARITHMETIC, include_str!("shaders/coded_centers.wgsl")]
-                .concat()
+            [
+                part,
+                device.arithmetic().source(),
+                ARITHMETIC,
+                CODED_CENTERS,
+                include_str!("shaders/coded_build.wgsl"),
+            ]
+            .concat()
         } else {
             CENTERS.to_owned()
+        };
+        let blocks = if keeps_codes {
+            include_str!("shaders/coded_blocks.wgsl")
+        } else {
+            include_str!("shaders/blocks.wgsl")
         };
         let source = [
             &tree_constants(is_common),
@@ -150,16 +178,22 @@ impl NodeKernels {
             BUILD,
             GROUPS,
             &centers,
+            blocks,
             include_str!("shaders/nodes.wgsl"),
         ];
         let module = device.module(&source.concat());
-        let of_centers: &[u32] = if is_coded { &[15, 16] } else { &[] };
+        let of_centers: &[u32] = if is_coded { &[15, 16, 17] } else { &[] };
         let kernel = |entry, bindings: &[u32]| {
             Kernel::new(device, &module, entry, &[bindings, of_centers].concat())
         };
         Self {
-            gather_spheres: kernel("gather_spheres", &[0, 1, 3, 7, 8, 9, 13, 14]),
-            block_boxes: kernel("block_boxes", &[0, 1, 3, 7, 8, 11, 14]),
+            gather_spheres: (!keeps_codes)
+                .then(|| kernel("gather_spheres", &[0, 1, 3, 7, 8, 9, 13, 14])),
+            block_boxes: if keeps_codes {
+                kernel("block_boxes", &[0, 1, 11])
+            } else {
+                kernel("block_boxes", &[0, 1, 3, 7, 8, 11, 14])
+            },
             build_level: Kernel::new(device, &module, "build_level", &[0, 10, 11, 12]),
         }
     }
@@ -170,8 +204,10 @@ const BUILD: &str = include_str!("shaders/build.wgsl");
 const CENTERS: &str = include_str!("shaders/centers.wgsl");
 pub(crate) const GROUPS: &str = include_str!("shaders/groups.wgsl");
 const ARITHMETIC: &str = include_str!("shaders/arithmetic.wgsl");
+pub(crate) const CODED_CENTERS: &str = include_str!("shaders/coded_centers.wgsl");
 
-fn encoding_constant(encoding: Encoding) -> String {
+/// The constant of the shaders for how centres are stored.
+pub(crate) fn encoding_constant(encoding: Encoding) -> String {
     let number = match encoding {
         Encoding::Points => 0,
         Encoding::Blocks => 1,
@@ -196,6 +232,10 @@ pub(crate) struct TreeBuilder {
     arrays: TreeArrays,
     shape: TreeShape,
     order: Order,
+    /// Words of coded centres in an array.
+    part_words: u64,
+    /// Coded blocks whose boxes are computed together, a multiple of [`WIDTH`].
+    blocks_of_part: usize,
 }
 
 /// The arrays of a tree, and those that only its build needs.
@@ -215,10 +255,12 @@ struct TreeArrays {
     moves: Array,
     grids: Array,
     wide: Array,
+    /// Coded centres beyond the first array of these.
+    more_centers: Array,
 }
 
 impl TreeArrays {
-    fn all(&self) -> [&Array; 16] {
+    fn all(&self) -> [&Array; 17] {
         let [first, second] = &self.pairs;
         let [boxes, other_boxes] = &self.boxes;
         [
@@ -238,8 +280,21 @@ impl TreeArrays {
             &self.moves,
             &self.grids,
             &self.wide,
+            &self.more_centers,
         ]
     }
+}
+
+/// Centres in a block of a native frame.
+const LANES: u64 = 16;
+
+/// Coded blocks whose boxes are computed together: 1.6 GB.
+const BLOCKS_OF_PART: usize = 1 << 26;
+
+/// Words of coded centres in an array of so many bytes: whole blocks in both encodings. Their numbers have 32 bits.
+const fn largest_part(max_array: u64) -> u64 {
+    let words = max_array / 4 / 48 * 48;
+    if words < 1 << 30 { words } else { 1 << 30 }
 }
 
 /// Number of blocks of `count` spheres; an empty tree has one.
@@ -257,15 +312,53 @@ fn level_sizes(blocks: u64) -> Vec<u64> {
     sizes
 }
 
-/// Memory of the device to build and trace a tree of `count` spheres, bytes. `has_motion`: they move while the shutter is
-/// open.
-pub fn tree_bytes(count: u64, is_common: bool, has_motion: bool) -> u64 {
-    let blocks = block_count(count);
-    let nodes: u64 = level_sizes(blocks).iter().sum();
-    let radii = if is_common { 0 } else { 4 + 4 };
-    let of_spheres = (12 + 2 * 8 + radii) * count + BYTES_OF_SPHERE * blocks * BLOCK;
-    let of_motion = if has_motion { 12 * count + 16 * blocks * BLOCK } else { 0 };
-    of_spheres + of_motion + 1024 * count.div_ceil(TILE) + 48 * blocks + 64 * nodes
+/// What the memory of a tree depends on.
+#[derive(Debug, Clone, Copy)]
+pub struct TreeNeed {
+    /// Number of spheres.
+    pub count: u64,
+    /// Whether they have the same radius.
+    pub is_common: bool,
+    /// Whether they move while the shutter is open.
+    pub has_motion: bool,
+    /// How their centres are stored.
+    pub encoding: Encoding,
+}
+
+impl TreeNeed {
+    /// Whether the centres have to stay coded, so that a device with arrays of so many bytes holds them.
+    pub const fn keeps_codes(&self, max_array: u64) -> bool {
+        let is_coded = matches!(self.encoding, Encoding::Q16 | Encoding::Q10);
+        is_coded && self.is_common && !self.has_motion && self.count > spheres_within(max_array)
+    }
+
+    /// The largest number of such spheres that a device with arrays of so many bytes holds.
+    pub fn most_within(&self, max_array: u64) -> u64 {
+        let coded = Self { count: u64::MAX, ..*self };
+        if !coded.keeps_codes(max_array) {
+            return spheres_within(max_array);
+        }
+        let in_words = 2 * largest_part(max_array) / self.encoding.words() * LANES;
+        let in_grids = max_array / size_of::<Grid>() as u64 * LANES;
+        in_words.min(in_grids).min(MAX_SPHERES)
+    }
+
+    /// Memory of a device with arrays of so many bytes to build and trace the tree, bytes.
+    pub fn bytes(&self, max_array: u64) -> u64 {
+        let Self { count, is_common, has_motion, encoding } = *self;
+        let blocks = block_count(count);
+        let nodes: u64 = 64 * level_sizes(blocks).iter().sum::<u64>();
+        let of_grids = if encoding.words() == 48 { 0 } else { size_of::<Grid>() as u64 };
+        let of_centers = (4 * encoding.words() + of_grids) * count.div_ceil(LANES);
+        if self.keeps_codes(max_array) {
+            return of_centers + nodes + 48 * blocks.min(BLOCKS_OF_PART as u64);
+        }
+        let radii = if is_common { 0 } else { 4 + 4 };
+        let of_spheres = (2 * 8 + radii) * count + BYTES_OF_SPHERE * blocks * BLOCK;
+        let of_motion = if has_motion { 12 * count + 16 * blocks * BLOCK } else { 0 };
+        let of_sort = 1024 * count.div_ceil(TILE);
+        of_centers + of_spheres + of_motion + of_sort + 48 * blocks + nodes
+    }
 }
 
 impl TreeBuilder {
@@ -278,7 +371,21 @@ impl TreeBuilder {
             arrays: TreeArrays::default(),
             shape: TreeShape::default(),
             order: Order::AlongCurve,
+            part_words: largest_part(device.adapter().max_array),
+            blocks_of_part: BLOCKS_OF_PART,
         }
+    }
+
+    /// Divides what stays coded into smaller parts, as if arrays were smaller.
+    #[cfg(test)]
+    pub(crate) fn divide(&mut self, part_words: u64, blocks_of_part: usize) {
+        (self.part_words, self.blocks_of_part) = (part_words, blocks_of_part);
+    }
+
+    /// The constant of the shaders that divides coded centres between two arrays, if they stay coded.
+    pub(crate) fn part_constant(&self) -> String {
+        let words = if self.shape.keeps_codes { self.part_words } else { u64::from(u32::MAX) };
+        format!("const PART: u32 = {words}u;\n")
     }
 
     /// Copies `spheres` to the device, and starts to build their tree.
@@ -287,7 +394,8 @@ impl TreeBuilder {
     /// If there are more than the device holds, or if the device fails.
     ///
     /// # Panics
-    /// If there are fewer radii than centres, or if keys are needed for coded centres.
+    /// If there are fewer radii than centres, if keys are needed for coded centres, or if spheres are to stay coded that
+    /// move, have a radius each, or are not coded.
     pub(crate) fn build(
         &mut self,
         device: &Device,
@@ -296,6 +404,8 @@ impl TreeBuilder {
     ) -> Result<(), GpuError> {
         let is_coded = matches!(spheres.centers, Centers::Coded { .. });
         assert!(!is_coded || spheres.order == Order::AlongCurve, "coded centres have no keys");
+        let can_keep = matches!(spheres.radii, Radii::Common(_)) && spheres.displacements.is_none();
+        assert!(!spheres.keeps_codes || (is_coded && can_keep), "these do not stay coded");
         self.shape = TreeShape::default();
         let shape = shape_of(spheres)?;
         self.upload(device, spheres)?;
@@ -314,14 +424,20 @@ impl TreeBuilder {
             Order::Any(length) => (length, shape.encoding),
             Order::AlongCurve => (KeyLength::Short, Encoding::Points),
         };
-        let variants = ((length, keyed), (shape.is_common, shape.encoding, shape.has_motion));
+        let of_nodes = (shape.is_common, shape.encoding, shape.keeps_codes, shape.has_motion);
+        let variants = ((length, keyed), of_nodes);
+        let part = self.part_constant();
         self.keys.entry(variants.0).or_insert_with(|| KeyKernels::new(device, variants.0));
-        self.nodes.entry(variants.1).or_insert_with(|| NodeKernels::new(device, variants.1));
+        self.nodes.entry(variants.1).or_insert_with(|| NodeKernels::new(device, variants.1, &part));
         // Record and start all stages
         let mut steps = Steps::default();
         self.uniforms.clear();
-        let sorted = self.plan_order(&mut steps, &shape, self.order);
-        self.plan_nodes(&mut steps, &shape, sorted);
+        if shape.keeps_codes {
+            self.plan_coded_nodes(&mut steps, &shape);
+        } else {
+            let sorted = self.plan_order(&mut steps, &shape, self.order);
+            self.plan_nodes(&mut steps, &shape, sorted);
+        }
         self.uniforms.upload(device)?;
         let mut commands = Commands::new(device);
         for step in &steps.0 {
@@ -345,6 +461,10 @@ impl TreeBuilder {
             2 => Some(self.arrays.spheres.binding()),
             3 => Some(self.arrays.order.binding()),
             22 => Some(self.arrays.moves.binding()),
+            24 => Some(self.arrays.centers.binding()),
+            25 => Some(self.arrays.more_centers.binding()),
+            26 => Some(self.arrays.grids.binding()),
+            27 => Some(self.arrays.wide.binding()),
             _ => None,
         }
     }
@@ -360,16 +480,21 @@ impl TreeBuilder {
         let nodes: u64 = level_sizes(blocks).iter().sum();
         let arrays = &mut self.arrays;
         // Reserve what the kernels write
+        let (ordered, boxed) = if spheres.keeps_codes {
+            (0, blocks.min(self.blocks_of_part as u64))
+        } else {
+            (count, blocks)
+        };
         arrays.bounds.reserve(device, "bounds", 32)?;
         for pairs in &mut arrays.pairs {
-            pairs.reserve(device, "keys of particles", 8 * count)?;
+            pairs.reserve(device, "keys of particles", 8 * ordered)?;
         }
-        arrays.counts.reserve(device, "counts of digits", 1024 * count.div_ceil(TILE))?;
+        arrays.counts.reserve(device, "counts of digits", 1024 * ordered.div_ceil(TILE))?;
         arrays.totals.reserve(device, "totals of digits", 1024)?;
-        arrays.spheres.reserve(device, "particles", 16 * blocks * BLOCK)?;
+        arrays.spheres.reserve(device, "particles", 16 * block_count(ordered) * BLOCK)?;
         arrays.nodes.reserve(device, "nodes", 64 * nodes)?;
         for boxes in &mut arrays.boxes {
-            boxes.reserve(device, "boxes", 24 * blocks)?;
+            boxes.reserve(device, "boxes", 24 * boxed)?;
         }
         let moves = if spheres.displacements.is_some() { 16 * blocks * BLOCK } else { 0 };
         arrays.moves.reserve(device, "motion of particles", moves)?;
@@ -380,7 +505,12 @@ impl TreeBuilder {
         let displacements = spheres.displacements.unwrap_or_default();
         let bytes = bytemuck::cast_slice(displacements);
         arrays.displacements.write(device, "motion of particles", bytes)?;
-        arrays.centers.write(device, "positions", spheres.centers.bytes())?;
+        let bytes = spheres.centers.bytes();
+        let part = usize::try_from(4 * self.part_words).unwrap_or(usize::MAX);
+        let most = if spheres.keeps_codes { part } else { usize::MAX };
+        let (first, others) = bytes.split_at(most.min(bytes.len()));
+        arrays.centers.write(device, "positions", first)?;
+        arrays.more_centers.write(device, "positions", others)?;
         match spheres.radii {
             Radii::Common(_) => {
                 arrays.radii.reserve(device, "radii", 0)?;
@@ -431,6 +561,42 @@ impl TreeBuilder {
         side
     }
 
+    /// Plans the levels of nodes above blocks that stay coded. The boxes of blocks have room for a part of them.
+    fn plan_coded_nodes(&mut self, steps: &mut Steps, shape: &TreeShape) {
+        let uniforms = &mut self.uniforms;
+        let mut step = |kind, side, build: Build, work, group| {
+            let uniform = uniforms.push(&build);
+            steps.0.push(Step { kind, side, uniform, work, group });
+        };
+        let build = Build {
+            count: narrow(shape.count),
+            wide_count: narrow(shape.wide_count),
+            ..Build::default()
+        };
+        let blocks = block_count(shape.count);
+        for first in (0..blocks).step_by(self.blocks_of_part) {
+            let children = (blocks - first).min(self.blocks_of_part as u64);
+            let (before, nodes) = (narrow(first / WIDTH), children.div_ceil(WIDTH));
+            let part = Build {
+                children: narrow(children),
+                nodes: narrow(nodes),
+                blocks_before: narrow(first),
+                nodes_before: before,
+                first: before,
+                ..build
+            };
+            step(Kind::BlockBoxes, 0, part, children, 256);
+            step(Kind::BuildLevel, 1, part, nodes, 64);
+        }
+        let sizes = level_sizes(blocks);
+        let (mut children, mut boxes) = (sizes[0], 0);
+        for (size, first) in sizes.into_iter().zip(shape.starts).skip(1) {
+            let build = Build { children: narrow(children), nodes: narrow(size), first, ..build };
+            step(Kind::BuildLevel, boxes, build, size, 64);
+            (children, boxes) = (size, 1 - boxes);
+        }
+    }
+
     /// Plans the blocks and the levels of nodes, from pairs on `side`.
     fn plan_nodes(&mut self, steps: &mut Steps, shape: &TreeShape, side: usize) {
         let uniforms = &mut self.uniforms;
@@ -468,7 +634,9 @@ impl TreeBuilder {
             Kind::Histogram => &self.sort.histogram,
             Kind::ScanDigits => &self.sort.scan_digits,
             Kind::Scatter => &self.sort.scatter,
-            Kind::GatherSpheres => &nodes.gather_spheres,
+            Kind::GatherSpheres => {
+                nodes.gather_spheres.as_ref().expect("planned unless spheres stay coded")
+            }
             Kind::BlockBoxes => &nodes.block_boxes,
             Kind::BuildLevel => &nodes.build_level,
         }
@@ -494,6 +662,7 @@ impl TreeBuilder {
             14 => &arrays.moves,
             15 => &arrays.grids,
             16 => &arrays.wide,
+            17 => &arrays.more_centers,
             _ => &arrays.nodes,
         };
         array.binding()
@@ -560,8 +729,16 @@ fn shape_of(spheres: &Spheres<'_>) -> Result<TreeShape, GpuError> {
     let has_motion = spheres.displacements.is_some();
     // Spheres with the same centre may move in different directions
     let keeps_copies = spheres.keeps_copies || has_motion;
-    let mut shape =
-        TreeShape { count, encoding, wide_count, has_motion, keeps_copies, ..TreeShape::default() };
+    let keeps_codes = spheres.keeps_codes;
+    let mut shape = TreeShape {
+        count,
+        encoding,
+        wide_count,
+        has_motion,
+        keeps_copies,
+        keeps_codes,
+        ..TreeShape::default()
+    };
     (shape.radius, shape.is_common) = match spheres.radii {
         Radii::Common(radius) => (radius, true),
         Radii::PerSphere(_) => (0.0, false),

@@ -71,6 +71,7 @@ fn boxes_contain_all_places_once() {
                         radii,
                         order,
                         displacements: None,
+                        keeps_codes: false,
                         keeps_copies: false,
                     },
                 );
@@ -112,6 +113,7 @@ fn neighbours_in_the_order_are_near_each_other() {
             radii,
             order: Order::Any(length),
             displacements: None,
+            keeps_codes: false,
             keeps_copies: false,
         };
         assert!(

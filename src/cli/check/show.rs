@@ -71,7 +71,7 @@ impl Check<'_> {
     fn device_bytes(&self) -> Option<u64> {
         let (survey, setup) = self.setup.as_ref()?;
         let is_gpu = setup.picture.renderer == RendererKind::Gpu;
-        is_gpu.then(|| gpu::device_bytes(setup, survey.most_particles as u64))
+        is_gpu.then(|| gpu::device_bytes(setup, self.sequence, survey.most_particles as u64))
     }
 
     /// The memory that a frame needs, by its use, and what limits it.

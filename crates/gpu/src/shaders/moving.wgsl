@@ -6,7 +6,7 @@
 
 // The sphere in a slot at the time of a ray
 fn sphere_at(slot: u32, time: f32) -> vec4<f32> {
-  let sphere = spheres[slot];
+  let sphere = stored_sphere(slot);
   return vec4<f32>(sphere.xyz + scaled(moves[slot].xyz, time), sphere.w);
 }
 

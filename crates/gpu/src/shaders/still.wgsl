@@ -1,6 +1,6 @@
 // Without motion blur: the counterparts of `moving.wgsl`.
 
-fn sphere_at(slot: u32, time: f32) -> vec4<f32> { return spheres[slot]; }
+fn sphere_at(slot: u32, time: f32) -> vec4<f32> { return stored_sphere(slot); }
 
 fn time_of(pixel: u32) -> f32 { return 0.0; }
 

@@ -8,14 +8,14 @@
 //
 // Files that include this one define `view: View` with the fields used here, `fn opacity_of(index: u32) -> f32`, and
 // `fn straight_transmittance(cosine: f32) -> f32`.
-// Spheres move or not, by `moving.wgsl` or `still.wgsl`.
+// Spheres move or not, by `moving.wgsl` or `still.wgsl`; `decoded_spheres.wgsl` or `coded_spheres.wgsl` has them.
 
 @group(0) @binding(1) var<storage, read> nodes: array<vec4<u32>>;
-@group(0) @binding(2) var<storage, read> spheres: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read> order: array<u32>;
 
 const MISS: u32 = 0xffffffffu;
 const FAR: f32 = 3.4e38;
+// Coordinates of spheres that no ray meets
+const NOWHERE: f32 = 3e38;
 // Transmittance below which a shadow ray ends
 const DARK: f32 = 1.0 / 4096.0;
 // The same behind clear spheres: 2^-32
@@ -25,7 +25,7 @@ const SLAB_SLACK: f32 = 1e-6;
 
 struct Ray { origin: vec3<f32>, direction: vec3<f32>, time: f32 }
 
-// Distance, slot in `spheres`, and index of the sphere
+// Distance, slot in the order of the tree, and index of the sphere
 struct Hit { t: f32, slot: u32, index: u32 }
 
 // A ray with the constants of its tests.
@@ -42,11 +42,6 @@ fn prepare(ray: Ray) -> Prepared {
 fn radius_of(sphere: vec4<f32>) -> f32 {
   if (COMMON_RADIUS) { return view.radius; }
   return sphere.w;
-}
-
-fn index_of(slot: u32) -> u32 {
-  if (COMMON_RADIUS) { return bitcast<u32>(spheres[slot].w); }
-  return order[slot];
 }
 
 // The distance to the sphere from outside, or from inside if the ray starts there; negative or NaN without one. The
