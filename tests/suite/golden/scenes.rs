@@ -47,6 +47,8 @@ const MATT: Material = Material {
     fresnel: Fresnel::Schlick,
     extinction: Vec3::ZERO,
     color_length: None,
+    scattering: Vec3::ZERO,
+    anisotropy: 0.0,
     finish: spherule::scene::Finish::Matte,
     interface_roughness: 0.0,
     priority: 0,

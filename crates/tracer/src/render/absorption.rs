@@ -1,7 +1,7 @@
 //! Absorption inside transmissive bodies by the Beer-Lambert law.
 //!
-//! The extinction coefficient of a medium is that of its material, or follows from the colours of the particles. In that
-//! case, a segment of a ray has the mean of the coefficients at its ends (trapezoidal rule). That is exact where the
+//! The extinction coefficient of a medium is that of its material, and may have in addition absorption that follows from
+//! the colours of the particles. In that case, a segment of a ray has the mean of the coefficients at its ends (trapezoidal rule). That is exact where the
 //! coefficient varies linearly along the segment; colours between the ends are not seen.
 
 use glam::Vec3;
@@ -64,14 +64,24 @@ impl RenderContext<'_> {
         let ray = rays.ray(lane);
         let at = |t: f32| {
             let color = self.color_inside(body.shape, ray.at(t), rays.time[lane]);
-            color.map(|color| extinction(color, length))
+            color.map(|color| body.material.extinction + extinction(color, length))
         };
         let [from, to] = ends;
         let inset = INSET * (to - from);
         match [from + inset, to - inset].map(at) {
             [Some(first), Some(last)] => 0.5 * (first + last),
             // There is no particle where a ray has left through a crack in the surface, and deep inside a body
-            [found, None] | [None, found] => found.unwrap_or(Vec3::ZERO),
+            [found, None] | [None, found] => found.unwrap_or(body.material.extinction),
+        }
+    }
+
+    /// The extinction coefficient of the medium of the separate sphere of a `particle`.
+    pub(super) fn sphere_extinction(&self, particle: u32) -> Vec3 {
+        let material = self.scene.particle_material();
+        match material.color_length {
+            None => material.extinction,
+            // Each sphere has one colour
+            Some(length) => material.extinction + extinction(self.source.color(particle), length),
         }
     }
 

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::layers::Layers;
 use super::path_tests::{GLASS, floor_from_above, settings};
 use super::{brute::Balls, solid::Solid, *};
-use crate::scene::{Environment, Finish, Light, LightKind};
+use crate::scene::{Environment, Finish, Light, LightKind, Material};
 
 /// A metal ball under a sun in a grey sky: the floor has fireflies, samples that meet the sun in the metal.
 pub(super) fn fireflies(finish: Finish) -> Scene {
@@ -76,11 +76,12 @@ fn direct_light_has_no_limit() {
 
 #[test]
 fn light_groups_lose_the_same_part() {
-    for (material, shape) in [(METAL, &ball() as &dyn Shape), (Finish::Matte, &Solid::ball(0.6))] {
-        let mut scene = fireflies(material);
-        if material == Finish::Matte {
-            *scene.particle_material_mut() = GLASS;
-        }
+    let metal = Material { finish: METAL, ..Material::DEFAULT };
+    let murky = GLASS.with_scattering(Vec3::new(1.0, 0.7, 0.4), 0.3, 0.4);
+    let body = Solid::ball(0.6);
+    for (material, shape) in [(metal, &ball() as &dyn Shape), (GLASS, &body), (murky, &body)] {
+        let mut scene = fireflies(METAL);
+        *scene.particle_material_mut() = material;
         let mut settings = RenderSettings { clamp: Some(0.5), max_depth: 8, ..settings(24, 16, 6) };
         let plain = clamped(shape, &scene, &settings);
         settings.channels.layers = Layers { light_groups: 2, ..Layers::NONE };

@@ -31,6 +31,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) shapes: SceneShapes<'a>,
     /// Whether some of the particles have a style with a material of its own.
     pub(super) has_styles: bool,
+    /// Whether the medium of a transmissive body scatters light along paths.
+    pub(super) has_scattering: bool,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
     pub(super) source: &'a dyn ShadeSource,
@@ -99,6 +101,8 @@ impl<'a> RenderContext<'a> {
         let is_body = shapes.interior == Interior::Body;
         let nested = shapes.nested.as_ref();
         Self {
+            has_scattering: settings.integrator == IntegratorKind::Path
+                && shapes.has_scattering(scene),
             boundaries: nested.map(BoundaryTable::for_shadow_rays),
             camera_bodies: nested.map(|nested| nested.at(eye)).unwrap_or_default(),
             is_camera_inside: is_body && shapes.particles.is_some_and(contains_eye),

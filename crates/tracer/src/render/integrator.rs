@@ -151,6 +151,8 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
         context.camera_segments(group, number, integrator.is_stochastic(), segments);
         packet.counts.primary += segments.rays.len() as u64;
         trace_packet(integrator, segments, 1, stop, packet, &mut scratch.next)?;
+        // Data channels are those of the surface behind a medium that scatters light
+        packet.hits.mask |= packet.media.hidden;
         // Store radiance, coverage and data channels of the samples
         group.radiance[number] = packet.radiance;
         group.coverage[number] = context.coverage(&packet.hits, &packet.coverage);

@@ -12,7 +12,6 @@ use super::{
     shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,
 };
-use crate::scene::material::extinction;
 use crate::scene::{Background, Material};
 use spherule_surface::{Intersections, MaterialId};
 use spherule_tree::math::{Lanes3, lanes_in, splat};
@@ -44,6 +43,14 @@ impl RenderContext<'_> {
         packet.throughput = segments.throughput;
         if depth == 1 && self.settings.drawing != Drawing::NONE {
             self.draw_outlines(&segments.rays, packet);
+        }
+        packet.media.clear();
+        if self.has_scattering && !packet.media.only_attenuate {
+            // Free paths that end before the first pane meet none
+            self.sample_free_paths(segments, packet);
+            self.pass_panes(segments, coherence, packet);
+            self.end_free_paths(segments, packet);
+            return;
         }
         self.pass_panes(segments, coherence, packet);
         match &self.shapes.nested {
@@ -109,10 +116,9 @@ impl RenderContext<'_> {
         match material.color_length {
             _ if lanes == 0 => {}
             None => attenuate(self.simd, &material.extinction, &hits.t, lanes, throughput),
-            // Each sphere has one colour
-            Some(length) => {
+            Some(_) => {
                 for lane in lanes_in(lanes) {
-                    let own = extinction(self.source.color(hits.particle[lane]), length);
+                    let own = self.sphere_extinction(hits.particle[lane]);
                     attenuate(self.simd, &own, &hits.t, 1 << lane, throughput);
                 }
             }

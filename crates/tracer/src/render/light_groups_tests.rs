@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::layers::Layers;
 use super::path_tests::{GLASS, floor_from_above, heap, image, settings};
-use super::{solid::Solid, *};
+use super::{brute::Balls, solid::Solid, *};
 use crate::scene::{Background, Environment, Falloff, Light, LightKind};
 
 /// Groups of the environment, and of the lights of [`lights`].
@@ -146,6 +146,14 @@ fn groups_are_known_behind_refraction_and_in_caustics() {
         let settings = RenderSettings { photons, max_depth: 5, ..settings(20, 4, 2) };
         check(&ball, &scene, &settings, &[]);
     }
+    // Media scatter light of all groups
+    let murky = GLASS.with_scattering(Vec3::new(1.0, 0.7, 0.4), 0.3, 0.4);
+    *scene.particle_material_mut() = murky;
+    for shape in [&ball as &dyn Shape, &Balls::one(Vec3::new(0.0, 0.0, 0.8), 0.5)] {
+        let settings = RenderSettings { photons: 0, max_depth: 5, ..settings(20, 4, 3) };
+        check(shape, &scene, &settings, &[]);
+    }
+    *scene.particle_material_mut() = GLASS;
     // All photons in one group
     scene.lights[3].group = 1;
     let settings = RenderSettings { photons: 20_000, ..settings(20, 4, 2) };

@@ -6,7 +6,7 @@
 use glam::Vec3;
 
 use super::channels::Channels;
-use super::dimensions::{BOUNCED, REFLECTED, REFRACTED};
+use super::dimensions::{BOUNCED, REFLECTED, REFRACTED, SCATTERED};
 use super::layers::LightClass;
 use super::planes::FilmPlane;
 use crate::scene::environment::LUMINANCE;
@@ -150,7 +150,8 @@ impl FirstInteraction {
     pub(super) fn continued(self, branch: u32) -> Self {
         match (self.0, branch) {
             (0, REFLECTED) => Self(1),
-            (0, REFRACTED) => Self(2),
+            // A camera inside a body sees the light of its medium as that behind its surface
+            (0, REFRACTED | SCATTERED) => Self(2),
             (0, BOUNCED) => Self(3),
             _ => self,
         }

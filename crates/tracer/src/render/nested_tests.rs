@@ -291,6 +291,37 @@ fn oil_and_water_in_white_surroundings_are_invisible() {
 }
 
 #[test]
+fn bodies_that_scatter_all_light_are_invisible_in_white_surroundings() {
+    let shapes = solids([
+        Solid::ball_at(Vec3::new(-0.5, 0.0, 0.0), 1.0),
+        Solid::ball_at(Vec3::new(0.5, 0.0, 0.2), 1.0),
+        Solid::ball_at(Vec3::new(0.0, 0.0, -0.8), 0.8),
+    ]);
+    let murky = |ior: f32, color: Vec3, anisotropy: f32| {
+        Material { ior, ..WATER }.with_scattering(color, 0.5, anisotropy)
+    };
+    // The first two refract alike, so that rays pass from one medium to the other
+    let materials = [
+        murky(1.33, Vec3::new(0.2, 0.5, 1.0), 0.0),
+        murky(1.33, Vec3::new(1.0, 0.1, 0.3), 0.6),
+        Material { ior: 1.47, ..WATER },
+    ];
+    for eye in [DVec3::new(0.3, -8.0, 1.0), DVec3::new(0.3, -0.1, 0.1)] {
+        let mut scene = scene(eye, DVec3::ZERO, &materials);
+        scene.environment = Some(std::sync::Arc::new(white()));
+        scene.is_environment_visible = true;
+        let settings = RenderSettings { max_depth: 24, ..path_settings(16, 64, 1000) };
+        let film = film(&shapes, &scene, &settings);
+        let colors: Vec<Vec3> =
+            film.color.iter().map(|pixel| Vec3::from_slice(&pixel[..3])).collect();
+        let mean = colors.iter().sum::<Vec3>() / colors.len() as f32;
+        assert!((mean - 1.0).abs().max_element() < 0.015, "{eye}: {mean}");
+        let brighter = colors.iter().filter(|color| (**color - 1.0).abs().max_element() > 0.01);
+        assert!(brighter.count() > 50, "{eye}: nothing scatters");
+    }
+}
+
+#[test]
 fn ids_and_points_are_those_of_the_visible_body() {
     let materials = [WATER, OIL];
     let scene = scene(DVec3::new(0.0, -8.0, 0.0), DVec3::ZERO, &materials);

@@ -43,6 +43,7 @@ pub(super) mod caustics;
 mod emission;
 pub(super) mod ground;
 mod light_channels;
+mod scattering;
 
 use ambient::AmbientLight;
 use catcher::Catcher;
@@ -53,6 +54,10 @@ const ROULETTE_START: u32 = 2;
 
 /// Greatest probability with which a path continues then, so that paths between white surfaces end.
 const MAX_CONTINUATION: f32 = 0.95;
+
+/// The same for paths in media, which scatter light many times before it leaves: with the probability above, few paths
+/// would have all its weight. Tuned on balls of milk.
+const MAX_SCATTERING: f32 = 0.99;
 
 /// See the module.
 pub(super) struct PathIntegrator<'a> {
@@ -132,8 +137,9 @@ impl Integrator for PathIntegrator<'_> {
         let ended = self.add_emitted(segments, packet);
         packet.hits.mask &= !ended;
         packet.take_light(LightClass::Emission);
+        let scattered = packet.media.scattered & !ended;
         // Camera rays that hit nothing see walls of glass
-        let unended = segments.lanes() & !ended;
+        let unended = segments.lanes() & !(ended | scattered);
         self.context.pass_underlays(segments, depth, unended, self.environment, packet);
         // A catcher darkens what is behind it
         if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
@@ -144,7 +150,7 @@ impl Integrator for PathIntegrator<'_> {
         }
         // Add the background of rays that hit nothing, and end the rays at holdouts
         let held_out = self.context.holdout_lanes(depth, &packet.hits);
-        let lanes = segments.lanes() & !ended & !held_out;
+        let lanes = unended & !held_out;
         self.add_escaped(segments, depth, lanes, packet);
         // Mirrors see the same behind it
         if let Some(catcher) = self.catcher.as_ref().filter(|c| c.is_mirrored && depth > 1) {
@@ -153,6 +159,10 @@ impl Integrator for PathIntegrator<'_> {
         }
         packet.clamp.keep_direct(segments, &packet.radiance, &packet.groups);
         packet.take_light(LightClass::Background);
+        // Scatter light in media
+        if scattered != 0 {
+            self.scatter_in_media(segments, depth, scattered, packet, next);
+        }
         if packet.hits.mask & !held_out == 0 {
             return;
         }
@@ -469,7 +479,8 @@ impl PathIntegrator<'_> {
             // It may hit a light, or pass through transmissive surfaces
             _ => 0,
         };
-        let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
+        let most = MAX_CONTINUATION;
+        let deeper = self.roulette(surface, lanes & !last, most, &mut rays.throughput);
         let how =
             Continuation { inside: segments.inside, crossed: BodySet::EMPTY, branch: BOUNCED };
         if self.catcher.as_ref().is_some_and(|catcher| catcher.is_mirrored) {
@@ -541,9 +552,15 @@ impl PathIntegrator<'_> {
             std::array::from_fn(|l| if is_traced(l) { f32::INFINITY } else { -1.0 });
     }
 
-    /// Ends some of the long paths in `lanes` at random, and compensates the throughput of the others. Returns the
-    /// lanes of paths that continue.
-    fn roulette(&self, surface: &Surface<'_>, lanes: u32, throughput: &mut Lanes3) -> u32 {
+    /// Ends some of the long paths in `lanes` at random, and compensates the throughput of the others, which continue with
+    /// a probability of at most `most`. Returns the lanes of paths that continue.
+    fn roulette(
+        &self,
+        surface: &Surface<'_>,
+        lanes: u32,
+        most: f32,
+        throughput: &mut Lanes3,
+    ) -> u32 {
         let segments = surface.segments;
         let long = lanes & lanes_where(|l| segments.bounces[l] >= ROULETTE_START);
         if long == 0 {
@@ -555,7 +572,7 @@ impl PathIntegrator<'_> {
         let mut ended = 0;
         for lane in lanes_in(long) {
             let along = lane3(throughput, lane);
-            let chance = along.max_element().min(MAX_CONTINUATION);
+            let chance = along.max_element().min(most);
             if u[lane] < chance {
                 set_lane3(throughput, lane, along / chance);
             } else {

@@ -143,6 +143,15 @@ impl<'a> SceneShapes<'a> {
         }
     }
 
+    /// Whether the medium of a transmissive body scatters light.
+    pub(super) fn has_scattering(&self, scene: &Scene) -> bool {
+        match (self.interior, &self.nested) {
+            (Interior::Opaque, _) => false,
+            (_, Some(nested)) => nested.all().iter().any(|body| body.material.scatters()),
+            _ => scene.particle_material().scatters(),
+        }
+    }
+
     /// The particles, if they bound one connected body.
     pub(super) fn connected_particles(&self) -> Option<&'a dyn Shape> {
         self.particles.filter(|shape| shape.is_connected())

@@ -9,6 +9,7 @@ use super::{
     clamp::IndirectClamp,
     entries::Entries,
     film_join::TilePass,
+    free_path::MediaAlong,
     interface::LeavingRays,
     layers::LightClass,
     light_groups::GroupLight,
@@ -101,6 +102,8 @@ pub(super) struct PacketScratch {
     pub(super) crossings: Intersections,
     /// Surfaces between equal media that rays have passed, in the order of their distance for each ray.
     pub(super) straight: Vec<StraightCrossing>,
+    /// Media along the rays, if any scatters light.
+    pub(super) media: MediaAlong,
     /// Spheres that are not fully opaque along each ray.
     pub(super) entries: [Entries; LANES],
     pub(super) weight: Lanes3,

@@ -111,11 +111,10 @@ impl RenderContext<'_> {
         let leaving = &mut packet.leaving;
         let (reflected, refracted) = (&mut leaving.reflected.weight, &mut leaving.refracted.weight);
         for lane in lanes_in(hits.lanes & !hits.last) {
-            let arriving = match segments.bounces[lane] {
-                0 => lane3(&packet.throughput, lane).max_element(),
-                // One ray only: the weights of paths that ended by chance are in those of the others
-                _ => 0.0,
-            };
+            let is_by_chance = segments.bounces[lane] > 0 || packet.media.sampled >> lane & 1 == 1;
+            // One ray only where paths ended by chance: the weights of these are in those of the others
+            let arriving =
+                if is_by_chance { 0.0 } else { lane3(&packet.throughput, lane).max_element() };
             let (path, sample) = (segments.path[lane], segments.sample[lane]);
             let sample = sample % self.settings.samples;
             let weights = [reflected[lane], refracted[lane]];

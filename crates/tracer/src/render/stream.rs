@@ -1,7 +1,7 @@
 //! Streams of path segments, in packets of 16.
 
 use super::body_set::BodySet;
-use super::dimensions::BOUNCED;
+use super::dimensions::{BOUNCED, SCATTERED};
 use super::light_split::FirstInteraction;
 use super::sampler::PathSeed;
 use spherule_surface::slices::slice_at;
@@ -22,7 +22,7 @@ pub(super) struct SegmentPacket {
     /// The diffuse part of the reflection that each ray comes from, 0 to 1; only less than 1 where something tells it
     /// apart.
     pub(super) diffuse: Lanes3,
-    /// Number of diffuse reflections of the path before each ray.
+    /// Number of diffuse reflections and scattering events of the path before each ray.
     pub(super) bounces: [u32; LANES],
     /// Path throughput from the sample to the origin of each ray, linear RGB.
     pub(super) throughput: Lanes3,
@@ -70,7 +70,7 @@ pub(super) struct Continuation {
     pub(super) inside: u32,
     /// The body whose surface the rays cross, if there may be several.
     pub(super) crossed: BodySet,
-    /// Which continuation of the paths it is; [`BOUNCED`] counts as a diffuse reflection.
+    /// Which continuation of the paths it is; [`BOUNCED`] and [`SCATTERED`] count as a bounce.
     pub(super) branch: u32,
 }
 
@@ -180,6 +180,7 @@ impl SegmentRun {
         growth: usize,
     ) {
         let Continuation { inside, crossed, branch } = how;
+        let is_bounce = matches!(branch, BOUNCED | SCATTERED);
         // Grow if there is no space for another whole packet
         let needed = (self.len + LANES).div_ceil(LANES) + 1;
         if self.packets.len() < needed {
@@ -204,7 +205,7 @@ impl SegmentRun {
             }
             segment.rays.time[to] = parents.rays.time[lane];
             segment.pdf[to] = rays.pdf[lane];
-            segment.bounces[to] = parents.bounces[lane] + u32::from(branch == BOUNCED);
+            segment.bounces[to] = parents.bounces[lane] + u32::from(is_bounce);
             segment.sample[to] = parents.sample[lane];
             segment.path[to] = parents.path[lane].child(branch);
             segment.first[to] = parents.first[lane].continued(branch);

@@ -11,7 +11,7 @@ use super::{
     bodies::{BoundaryLanes, TransmissiveBodies, TransmissiveBody, lanes_inside, media_of},
     body_set::BodySet,
     context::RenderContext,
-    interface::cross_straight,
+    interface::{cross_straight, leaving},
     lights::LightSamples,
     ray_counts::RayCounts,
     scene_shapes::Interior,
@@ -20,7 +20,8 @@ use super::{
 };
 use spherule_surface::{Intersections, Shape};
 use spherule_tree::accel::Coherence;
-use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
+use spherule_tree::math::functions::exp;
+use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, set_lane3, splat};
 use spherule_tree::ray::RayPacket;
 
 /// Maximum number of crossings of one body along a shadow ray.
@@ -66,6 +67,9 @@ impl RenderContext<'_> {
             (Interior::Body, _, Some(body)) => {
                 let (inside, transmittance) = (segments.inside, &mut transmittance);
                 self.cross_body(body, unattenuated, coherence, inside, crossings, transmittance)
+            }
+            (_, _, Some(spheres)) if self.has_scattering => {
+                self.cross_murky_spheres(spheres, unattenuated, crossings, &mut transmittance)
             }
             (_, _, Some(spheres)) => self.cross_spheres(spheres, unattenuated, &mut transmittance),
             (_, _, None) => return samples.lanes,
@@ -130,6 +134,54 @@ impl RenderContext<'_> {
         transmittance[2] = transmittance[0];
         // Find the lanes with some light left
         lanes_in(samples.lanes).mask_where(|lane| transmittance[0][lane] > 0.0)
+    }
+
+    /// The transmittance of separate spheres with their media, crossing after crossing for all rays at once. A ray is
+    /// inside a sphere in front of each crossing at which it leaves one. Returns the lanes in which it is not 0.
+    fn cross_murky_spheres(
+        &self,
+        spheres: &dyn Shape,
+        samples: &LightSamples,
+        hits: &mut Intersections,
+        transmittance: &mut Lanes3,
+    ) -> u32 {
+        let rays = &samples.rays;
+        let (mut reached, mut alive) = (samples.lanes, samples.lanes);
+        // Rays go on beyond the light, which may be inside a sphere
+        let far = splat(f32::INFINITY);
+        let mut remaining = *rays;
+        remaining.t_max = far;
+        let mut from = rays.t_min;
+        for _ in 0..MAX_CROSSINGS {
+            // Find the next crossing of each ray
+            remaining.keep_only(alive);
+            hits.clear();
+            spheres.intersect(&mut remaining, Coherence::Incoherent, 0, hits);
+            let found = hits.mask & alive;
+
+            // Attenuate by the sphere that the ray leaves, and by the crossing in front of the light
+            for lane in lanes_in(found & leaving(self.simd, rays, hits)) {
+                let length = (hits.t[lane].min(rays.t_max[lane]) - from[lane]).max(0.0);
+                let extinction = self.sphere_extinction(hits.particle[lane]);
+                let kept = extinction.map(|coefficient| exp(-length * coefficient));
+                set_lane3(transmittance, lane, lane3(transmittance, lane) * kept);
+            }
+            let crossing = lanes_in(found).mask_where(|lane| hits.t[lane] < rays.t_max[lane]);
+            cross_straight(self.simd, &self.boundary, rays, hits, crossing, transmittance);
+
+            // End rays without transmittance, and continue the others
+            let dark = dark_lanes(found, transmittance);
+            reached &= !dark;
+            alive = crossing & !dark;
+            if alive == 0 {
+                break;
+            }
+            hits.continue_rays(&mut remaining, alive, &far);
+            for lane in lanes_in(alive) {
+                from[lane] = hits.t[lane];
+            }
+        }
+        reached
     }
 
     /// The transmittance of one connected body, crossing after crossing for all rays at once; rays of `inside` start

@@ -70,12 +70,20 @@ pub struct Material {
     pub transmission: f32,
     /// The formula for `r` of eq. 4.1.
     pub fresnel: Fresnel,
-    /// Extinction coefficient of the medium inside, per length: light is attenuated by `exp(-extinction * length)`
-    /// (Beer-Lambert law). Not negative. Shadows of separate spheres ignore it.
+    /// Extinction coefficient of the medium inside, per length: absorption and scattering attenuate light by
+    /// `exp(-extinction * length)` (Beer-Lambert law). Not less than `scattering`. Shadows of separate spheres ignore it
+    /// unless they scatter light.
     pub extinction: Vec3,
-    /// Length over which the medium inside gives white light the colour of the particles there, in place of `extinction`;
-    /// above 0. Shadows of separate spheres ignore it.
+    /// Length over which the medium inside gives white light the colour of the particles there, in addition to
+    /// `extinction`, which then has no absorption; above 0. Shadows of separate spheres ignore it unless they scatter
+    /// light.
     pub color_length: Option<f32>,
+    /// Scattering coefficient of the medium inside, per length, not negative: the part of `extinction` that scatters light
+    /// to other directions in path tracing. In Whitted's model it is lost.
+    pub scattering: Vec3,
+    /// Mean cosine of the angle by which the medium inside deflects light (the parameter `g` of Henyey and Greenstein):
+    /// 0 scatters to all sides alike, above 0 forwards. From -[`MAX_ANISOTROPY`] to [`MAX_ANISOTROPY`].
+    pub anisotropy: f32,
     /// How the surface meets light.
     pub finish: Finish,
     /// Roughness of the surface of transmissive particles for path tracing, 0 (smooth) to 1.
@@ -107,6 +115,9 @@ pub enum Finish {
     /// Drops of spray that fade out and scatter light from their inside.
     Foam,
 }
+
+/// Largest anisotropy of media: beyond it, single directions have almost all light, and pictures are noise.
+pub const MAX_ANISOTROPY: f32 = 0.95;
 
 /// Index of refraction of panes.
 const PANE_IOR: f32 = 1.5;
@@ -152,6 +163,8 @@ impl Material {
         fresnel: Fresnel::Schlick,
         extinction: Vec3::ZERO,
         color_length: None,
+        scattering: Vec3::ZERO,
+        anisotropy: 0.0,
         finish: Finish::Matte,
         interface_roughness: 0.0,
         priority: 0,
@@ -197,6 +210,15 @@ impl Material {
         if let Some(value) = extinction.iter().find(|v| !(0.0..=f32::MAX).contains(*v)) {
             return Err(MaterialError { name: "extinction", value: *value });
         }
+        // What is scattered is a part of the extinction
+        for (value, max) in self.scattering.to_array().into_iter().zip(extinction) {
+            if !(0.0..=max).contains(&value) {
+                return Err(MaterialError { name: "scattering", value });
+            }
+        }
+        if !(-MAX_ANISOTROPY..=MAX_ANISOTROPY).contains(&self.anisotropy) {
+            return Err(MaterialError { name: "anisotropy", value: self.anisotropy });
+        }
         if let Some(value) = self.color_length.filter(|length| !(0.0..=f32::MAX).contains(length)) {
             return Err(MaterialError { name: "color_length", value });
         }
@@ -207,9 +229,23 @@ impl Material {
         }
     }
 
-    /// Whether the medium inside absorbs light.
+    /// The same with a medium inside that scatters light of a `color` (linear RGB) with a mean free path of `length` where
+    /// that is 1, in addition to its absorption.
+    #[must_use]
+    pub fn with_scattering(self, color: Vec3, length: f32, anisotropy: f32) -> Self {
+        let scattering = (color / length).clamp(Vec3::ZERO, Vec3::MAX);
+        let extinction = (self.extinction + scattering).min(Vec3::MAX);
+        Self { extinction, scattering, anisotropy, ..self }
+    }
+
+    /// Whether the medium inside attenuates light.
     pub fn absorbs(&self) -> bool {
         self.color_length.is_some() || self.extinction != Vec3::ZERO
+    }
+
+    /// Whether the medium inside scatters light.
+    pub fn scatters(&self) -> bool {
+        self.transmission > 0.0 && self.scattering != Vec3::ZERO
     }
 
     /// `R0` of eq. 4.3, which is the same for both sides.
@@ -397,5 +433,16 @@ mod tests {
         assert_eq!(with_ior(f32::NAN).validate().unwrap_err().name, "ior");
         let dark = Material { diffuse: -0.1, ..Material::DEFAULT };
         assert_eq!(dark.validate().unwrap_err().name, "diffuse");
+        let murky = |scattering: f32, anisotropy: f32| {
+            let scattering = Vec3::new(0.5, scattering, 0.5);
+            Material { extinction: Vec3::ONE, scattering, anisotropy, ..Material::DEFAULT }
+        };
+        assert_eq!(murky(1.0, 0.95).validate(), Ok(()));
+        for scattering in [-0.1, 1.5, f32::NAN, f32::INFINITY] {
+            assert_eq!(murky(scattering, 0.0).validate().unwrap_err().name, "scattering");
+        }
+        for anisotropy in [-0.96, 1.0, f32::NAN] {
+            assert_eq!(murky(1.0, anisotropy).validate().unwrap_err().name, "anisotropy");
+        }
     }
 }

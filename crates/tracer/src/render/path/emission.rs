@@ -39,7 +39,7 @@ impl PathIntegrator<'_> {
             }
             light.intersect(self.context.simd, &segments.rays, &mut emission);
             for lane in lanes_in(lanes & emission.lanes) {
-                let is_first = match packet.hits.mask >> lane & 1 {
+                let is_first = match (packet.hits.mask | packet.media.scattered) >> lane & 1 {
                     0 => true,
                     _ => emission.t[lane] < segments.rays.t_max[lane],
                 };
@@ -76,6 +76,10 @@ impl PathIntegrator<'_> {
         segments: &SegmentPacket,
         packet: &PacketScratch,
     ) -> Vec3 {
+        if packet.media.sampled >> lane & 1 == 1 {
+            // Panes inside media that scatter light do not count
+            return lane3(&segments.throughput, lane) * packet.media.passing_weight(lane, t);
+        }
         let is_before_panes = !self.context.shapes.panes.is_empty() && t < packet.first_pane[lane];
         if is_before_panes {
             lane3(&segments.throughput, lane)

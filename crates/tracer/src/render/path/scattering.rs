@@ -1,0 +1,119 @@
+//! Light that media scatter towards the camera: at the ends of free paths (`media.rs`).
+//!
+//! Each light is sampled there. Its shadow ray goes straight through surfaces and is attenuated by the media on its way,
+//! as for surfaces inside bodies. The path goes on in a direction of the phase function, and alone finds the
+//! environment. A scattering event is a bounce. Photons that media scatter are left out (`ground/photons.rs`), so no
+//! light is counted twice.
+
+use super::{MAX_SCATTERING, Occlusion, PathIntegrator, Surface, light_dimension};
+use crate::render::{
+    body_set::BodySet,
+    bsdf::reflect_samples,
+    dimensions::{BSDF, SCATTERED},
+    layers::LightClass,
+    phase::{henyey_greenstein, sample_henyey_greenstein},
+    sampler::get_2d_lanes,
+    scene_shapes::Interior,
+    scratch::PacketScratch,
+    stream::{Continuation, RayStreams, SegmentPacket},
+};
+use glam::Vec3;
+use spherule_tree::math::{lane3, lanes_in, lanes_where, set_lane3, splat};
+
+impl PathIntegrator<'_> {
+    /// Adds the light that media scatter at the ends of the rays of `lanes`, and continues their paths.
+    pub(super) fn scatter_in_media(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let max = self.context.settings.traced_bounces();
+        let lanes = lanes & lanes_where(|l| segments.bounces[l] <= max);
+        if lanes == 0 {
+            return;
+        }
+        for lane in lanes_in(lanes) {
+            let end = segments.rays.ray(lane).at(segments.rays.t_max[lane]);
+            set_lane3(&mut packet.surface.start, lane, end);
+        }
+        let event = self.surface(segments, depth, lanes);
+        self.add_scattered_lights(&event, packet);
+        packet.take_light(LightClass::Refraction);
+        self.scatter_paths(&event, packet, next);
+    }
+
+    /// Adds the light of each light source.
+    fn add_scattered_lights(&self, event: &Surface<'_>, packet: &mut PacketScratch) {
+        let (context, simd) = (&self.context, self.context.simd);
+        packet.weight = packet.throughput;
+        for (index, light) in context.lights.iter().enumerate() {
+            // Sample the light
+            let mut u = [splat(0.0); 2];
+            if light.has_extent() {
+                let path = &event.segments.path;
+                get_2d_lanes(simd, path, light_dimension(index), &event.sample, &mut u);
+            }
+            light.sample_li(simd, &packet.surface.start, &u, &mut packet.light);
+            // Scatter it towards the origin of the ray
+            for lane in lanes_in(event.lanes) {
+                let direction = lane3(&event.segments.rays.direction, lane);
+                let cosine = direction.dot(lane3(&packet.light.rays.direction, lane));
+                let value = henyey_greenstein(packet.media.anisotropy[lane], cosine);
+                set_lane3(&mut packet.bsdf.value, lane, Vec3::splat(value));
+            }
+            let (values, weight) = (&packet.bsdf, &packet.weight);
+            reflect_samples(simd, values, weight, false, event.lanes, &mut packet.light);
+            self.scale_entered(event, packet);
+            // Trace the shadow rays
+            if packet.light.lanes != 0 {
+                let group = context.light_group(index);
+                self.add_visible(Occlusion::of(&**light), group, event, packet);
+            }
+        }
+    }
+
+    /// Divides light samples by the square of the index of refraction; see [`Self::scale_inside`].
+    fn scale_entered(&self, event: &Surface<'_>, packet: &mut PacketScratch) {
+        let context = &self.context;
+        for lane in lanes_in(packet.light.lanes) {
+            let ior = match context.shapes.interior {
+                // Rays do not store that they are in a separate sphere
+                Interior::Spheres => context.scene.particle_material().ior,
+                _ => context.ior_at(event.segments, lane),
+            };
+            let leaving = lane3(&packet.light.radiance, lane) / (ior * ior);
+            set_lane3(&mut packet.light.radiance, lane, leaving);
+        }
+    }
+
+    /// Continues the paths in directions that are sampled from the phase function.
+    fn scatter_paths(
+        &self,
+        event: &Surface<'_>,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let (segments, simd) = (event.segments, self.context.simd);
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(simd, &segments.path, BSDF, &event.sample, &mut u);
+        let PacketScratch { media, leaving, surface: points, throughput, .. } = packet;
+        let rays = &mut leaving.reflected;
+        rays.origin = points.start;
+        rays.throughput = *throughput;
+        for lane in lanes_in(event.lanes) {
+            let direction = lane3(&segments.rays.direction, lane);
+            let u = [u[0][lane], u[1][lane]];
+            let scattered = sample_henyey_greenstein(media.anisotropy[lane], direction, u);
+            set_lane3(&mut rays.direction, lane, scattered);
+        }
+        // The environment is not sampled otherwise, so its light has the full weight
+        rays.pdf = splat(f32::INFINITY);
+        let lanes = self.roulette(event, event.lanes, MAX_SCATTERING, &mut rays.throughput);
+        let how =
+            Continuation { inside: segments.inside, crossed: BodySet::EMPTY, branch: SCATTERED };
+        next.reflected.push(lanes, rays, segments, how);
+    }
+}
