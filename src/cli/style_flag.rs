@@ -4,10 +4,18 @@ use spherule_formats::ValueError;
 use toml::{Table, Value};
 
 /// Settings of `material` that may stand beside it, those of glass and water first.
-const MATERIAL_KEYS: [&str; 5] =
-    ["ior", "absorption", "absorption_length", "roughness", "underlay"];
+const MATERIAL_KEYS: [&str; 8] = [
+    "ior",
+    "absorption",
+    "absorption_length",
+    "scattering",
+    "scattering_length",
+    "anisotropy",
+    "roughness",
+    "underlay",
+];
 /// Number of those of glass and water.
-const OPTICS: usize = 3;
+const OPTICS: usize = 6;
 
 /// The table `[[style]]` of `type == 2: sticks, radius 0.3, color red`.
 pub(super) fn style(text: &str) -> Result<Table, ValueError> {
@@ -111,6 +119,10 @@ mod tests {
         assert_eq!(found.unwrap(), toml::from_str::<Table>(expected).unwrap());
         assert_eq!(style(": hidden").unwrap(), toml::from_str("draw = \"hidden\"").unwrap());
         // Settings of the material
+        let found = style("type == 2: smooth, scattering white, scattering-length 0.1").unwrap();
+        let expected = "where = \"type == 2\"\ndraw = \"smooth\"\n\
+                        material = { type = \"water\", scattering = \"white\", scattering_length = 0.1 }";
+        assert_eq!(found, toml::from_str::<Table>(expected).unwrap());
         let found = style("type == 2: smooth, ior 1.47, absorption [0.9, 0.7, 0.2]");
         let expected = "where = \"type == 2\"\ndraw = \"smooth\"\n\
                         material = { type = \"water\", ior = 1.47, absorption = [0.9, 0.7, 0.2] }";

@@ -25,7 +25,7 @@ use crate::survey::Survey;
 const DRAFT_PHOTONS: u32 = 50_000;
 
 /// Beginnings of keys that need no other particles and no other tree.
-const SHADING_KEYS: [&str; 26] = [
+const SHADING_KEYS: [&str; 28] = [
     "camera.",
     "image.",
     "output.",
@@ -34,11 +34,13 @@ const SHADING_KEYS: [&str; 26] = [
     "overlay.",
     "material.absorption",
     "material.ambient",
+    "material.anisotropy",
     "material.color",
     "material.diffuse",
     "material.ior",
     "material.reflection",
     "material.roughness",
+    "material.scattering",
     "material.shininess",
     "material.specular",
     "render.background",

@@ -1,14 +1,16 @@
 //! Radius and material of the surface.
 
+use glam::Vec3;
+
 use crate::manifest::{Absorption, Manifest};
 use crate::math::narrow;
 use crate::scene::{Bounds, Fresnel, Material, material};
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
-/// Default distance at which light takes the colour of absorption, as a fraction of the diagonal of the bounds: a pool
-/// seen from above is tinted, a drop is not. Tuned on dam breaks.
-const ABSORPTION: f64 = 0.25;
+/// Default distance at which light takes the colour of absorption, and mean distance between scattering events, as a
+/// fraction of the diagonal of the bounds: a pool seen from above is tinted or murky, a drop is not. Tuned on dam breaks.
+const LENGTH: f64 = 0.25;
 
 /// Radius of the spheres of a union, in particle radii. Spheres that only touch leave gaps between them, and light
 /// passes through a sponge of beads; these spheres overlap enough to close the gaps.
@@ -40,20 +42,25 @@ pub(super) fn optics(
     kind: SurfaceKind,
     bounds: &Bounds,
 ) -> Material {
-    let length = match m.absorption_length {
+    let length_of = |own: Option<f64>| match own {
         Some(length) => narrow(length),
-        None => narrow(bounds.diagonal() * ABSORPTION).max(f32::MIN_POSITIVE),
+        None => narrow(bounds.diagonal() * LENGTH).max(f32::MIN_POSITIVE),
     };
+    let length = length_of(m.absorption_length);
     let usual = m.resolved(match kind {
         SurfaceKind::Spheres => Fresnel::Schlick,
         SurfaceKind::Union | SurfaceKind::Smooth => Fresnel::Exact,
     });
-    match m.absorption {
+    let absorbing = match m.absorption {
         Absorption::Color(color) => {
             Material { extinction: material::extinction(color, length), ..usual }
         }
         Absorption::OfParticles => Material { color_length: Some(length), ..usual },
+    };
+    if m.scattering == Vec3::ZERO {
+        return absorbing;
     }
+    absorbing.with_scattering(m.scattering, length_of(m.scattering_length), m.anisotropy)
 }
 
 /// The larger of two values divided by the smaller.

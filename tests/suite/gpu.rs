@@ -198,6 +198,13 @@ mod on_a_device {
         let lacking = ["still", "in", "-o", "a.png", "--surface=union", "--gpu=99"];
         let ran = workshop.run(&[&lacking[..], &SMALL].concat()).expect(0);
         ran.prints("rendered on the CPU: render.surface: other surfaces");
+        let murky = ["--set", "material.type=glass", "--set", "material.scattering=white"];
+        let lacking = ["still", "in", "-o", "b.png", "--gpu=99"];
+        let ran = workshop.run(&[&lacking[..], &murky, &SMALL].concat()).expect(0);
+        ran.prints("rendered on the CPU: material.scattering: media that scatter light");
+        let lacking = ["still", "in", "-o", "c.png", "--device=gpu"];
+        let ran = workshop.run(&[&lacking[..], &murky, &SMALL].concat()).expect(2);
+        ran.prints("material.scattering: media that scatter light cannot be rendered on a GPU yet");
     }
 
     #[test]

@@ -36,6 +36,8 @@ use crate::{Device, GpuError};
 /// What the device lacks of the renderer for CPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
+    /// Media inside particles that scatter light.
+    Scattering,
     /// Light that transmissive particles focus on other surfaces.
     Photons,
     /// Styles beside transmissive particles.
@@ -65,6 +67,7 @@ pub enum Missing {
 impl fmt::Display for Missing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Scattering => "media that scatter light",
             Self::Photons => "caustics of transmissive particles",
             Self::StylesInGlass => "styles beside transmissive particles",
             Self::Ground => "a ground in Whitted's model, or one of sand or with a picture",
@@ -94,6 +97,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         !is_whitted && matches!(ground.pattern, Pattern::Plain | Pattern::Checker { .. })
     };
     [
+        (scene.materials.iter().any(scene::Material::scatters), Missing::Scattering),
         (needs_photons(scene, settings), Missing::Photons),
         (is_clear && has_styles, Missing::StylesInGlass),
         (scene.ground.as_ref().is_some_and(|ground| !is_plain(ground)), Missing::Ground),

@@ -1,8 +1,11 @@
 //! Dependencies between tables: what one allows another.
 
+use glam::Vec3;
 use spherule_jobs::FrameRange;
 use spherule_surface::SurfaceKind;
-use spherule_tracer::render::{FilmPlane, MAX_LITERAL_DEPTH, MAX_SIDE, MAX_TRANSMISSIVE_BODIES};
+use spherule_tracer::render::{
+    FilmPlane, IntegratorKind, MAX_LITERAL_DEPTH, MAX_SIDE, MAX_TRANSMISSIVE_BODIES,
+};
 use spherule_tracer::scene::MaterialId;
 
 use super::bonds::BondSearch;
@@ -74,6 +77,11 @@ pub(super) const RULES: &[Rule] = rules! {
         "render.integrator = \"whitted\" has no shadow catcher; choose \"path\" (--integrator path), or a plain ground";
 };
 
+const OPAQUE: &str =
+    "has no effect: light does not enter this material; set type = \"glass\" or \"water\"";
+const NOT_FOLLOWED: &str = "render.integrator = \"whitted\" does not follow the light that media scatter; choose \"path\" (--integrator path), \
+     or leave it out";
+
 impl Manifest {
     /// Checks the rules between keys of different tables, for a manifest that was made or changed by a program.
     ///
@@ -128,6 +136,7 @@ impl Manifest {
         }
         self.check_branches(root);
         self.check_styles(root);
+        self.check_scattering(root);
         self.check_noise(root);
     }
 
@@ -177,6 +186,23 @@ impl Manifest {
             let what =
                 format!("{count} clear bodies, but at most {MAX_TRANSMISSIVE_BODIES} are possible");
             root.wrong(key, &what);
+        }
+    }
+
+    /// Checks that the integrator follows the light that media scatter, and warns where light does not enter them.
+    fn check_scattering(&self, root: &mut Section<'_>) {
+        let of_rest = ("material".to_owned(), self.material.scattering, self.material.is_clear());
+        let of_styles = self.styles.iter().enumerate().filter_map(|(number, style)| {
+            let own = style.material.as_ref()?;
+            Some((format!("style.{number}.material"), own.scattering, own.is_clear()))
+        });
+        for (table, scattering, is_clear) in std::iter::once(of_rest).chain(of_styles) {
+            let key = format!("{table}.scattering");
+            match (scattering == Vec3::ZERO, is_clear, self.integrator()) {
+                (true, ..) | (false, true, IntegratorKind::Path) => {}
+                (false, false, _) => root.warn(&key, OPAQUE),
+                (false, true, IntegratorKind::Whitted) => root.wrong(&key, NOT_FOLLOWED),
+            }
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
+use spherule_tracer::scene::material::MAX_ANISOTROPY;
 use spherule_tracer::scene::{self, Finish, Fresnel};
 
 use super::absorption::Absorption;
@@ -64,6 +66,14 @@ pub struct Material {
     pub absorption: Absorption,
     /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
+    /// Colour of the light that the medium inside scatters, linear RGB: the scattering coefficient times
+    /// [`Self::scattering_length`].
+    pub scattering: Vec3,
+    /// The mean distance between two scattering events where `scattering` is 1; by default it depends on the extent of the
+    /// particles.
+    pub scattering_length: Option<f64>,
+    /// Mean cosine of the angle by which the medium inside deflects light.
+    pub anisotropy: f32,
     /// Materials of parts of the particles.
     pub parts: Vec<Part>,
 }
@@ -79,6 +89,9 @@ impl Default for Material {
             fresnel: None,
             absorption: Absorption::default(),
             absorption_length: None,
+            scattering: Vec3::ZERO,
+            scattering_length: None,
+            anisotropy: 0.0,
             parts: Vec::new(),
         }
     }
@@ -201,6 +214,17 @@ impl Material {
             absorption => self.absorption, from(0), to(1);
             /// Distance after which white light has the colour absorption, or auto
             absorption_length => self.absorption_length, or("auto"), unit("a length"), above(0), single();
+            /// Colour of the light that the medium inside scatters, linear RGB; [0, 0, 0] scatters none
+            ///
+            /// For glass and water with integrator = "path". The scattering coefficient is scattering divided by
+            /// scattering_length.
+            scattering => self.scattering, from(0), to(1), affects(Affects::PathTracing);
+            /// Mean distance between two scattering events where scattering is 1, or auto
+            scattering_length => self.scattering_length, or("auto"), unit("a length"), above(0), single(),
+                affects(Affects::PathTracing);
+            /// Mean cosine of the angle of scattering: -0.95 (backwards), 0 (to all sides alike) to 0.95 (forwards)
+            anisotropy => self.anisotropy, from(-MAX_ANISOTROPY), to(MAX_ANISOTROPY), single(),
+                affects(Affects::PathTracing);
         );
     }
 }

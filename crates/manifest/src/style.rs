@@ -1,8 +1,10 @@
 //! `[[style]]`: how some of the particles are drawn, unlike the others.
 
+use glam::Vec3;
 use spherule_frame::grain_columns::{GrainNames, SizeKind};
 use spherule_selection::Condition;
 use spherule_surface::SurfaceKind;
+use spherule_tracer::scene::material::MAX_ANISOTROPY;
 use spherule_tracer::scene::{self, Finish, Fresnel};
 
 use super::absorption::Absorption;
@@ -123,6 +125,13 @@ pub struct StyleMaterial {
     pub absorption: Absorption,
     /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
+    /// Colour of the light that the medium inside scatters, linear RGB.
+    pub scattering: Vec3,
+    /// The mean distance between two scattering events where `scattering` is 1; by default it depends on the extent of the
+    /// particles.
+    pub scattering_length: Option<f64>,
+    /// Mean cosine of the angle by which the medium inside deflects light.
+    pub anisotropy: f32,
     /// Whether thin glass is drawn behind everything else.
     pub underlay: bool,
 }
@@ -135,6 +144,9 @@ impl Default for StyleMaterial {
             ior: None,
             absorption: Absorption::default(),
             absorption_length: None,
+            scattering: Vec3::ZERO,
+            scattering_length: None,
+            anisotropy: 0.0,
             underlay: false,
         }
     }
@@ -156,6 +168,12 @@ impl InlineTable for StyleMaterial {
             absorption => self.absorption, from(0), to(1);
             /// The length for absorption
             absorption_length => self.absorption_length, above(0), single();
+            /// Colour of the light that the medium inside scatters
+            scattering => self.scattering, from(0), to(1);
+            /// Mean distance between two scattering events where scattering is 1
+            scattering_length => self.scattering_length, above(0), single();
+            /// Mean cosine of the angle of scattering
+            anisotropy => self.anisotropy, from(-MAX_ANISOTROPY), to(MAX_ANISOTROPY), single();
             /// Whether thin glass is drawn behind everything else
             underlay => self.underlay;
         );
@@ -183,6 +201,9 @@ impl StyleMaterial {
             roughness: self.roughness.unwrap_or(ROUGHNESS),
             absorption: self.absorption,
             absorption_length: self.absorption_length,
+            scattering: self.scattering,
+            scattering_length: self.scattering_length,
+            anisotropy: self.anisotropy,
             constants: scene::Material { ior: self.ior.unwrap_or(ior), ..usual.constants },
             fresnel: self.is_clear().then_some(Fresnel::Exact).or(usual.fresnel),
             ..Material::default()
@@ -346,9 +367,10 @@ impl Style {
             range => self.range, example("[0.0, 4.0]"), unset("that of these particles in the sequence");
             /// Opacity of spheres or grains as material.opacity
             opacity => self.opacity;
-            /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption and absorption_length
+            /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption, scattering and others
             ///
-            /// The types are matte, plastic, metal, glass, water, and thin-glass for walls: a body that light passes without
+            /// The keys of glass and water are those of [material]: ior, absorption, absorption_length, scattering,
+            /// scattering_length and anisotropy. The types are matte, plastic, metal, glass, water, and thin-glass for walls: a body that light passes without
             /// refraction. With underlay = true it is drawn behind everything else. Where bodies of glass and water overlap, the
             /// first style fills the space.
             material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),

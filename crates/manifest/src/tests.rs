@@ -424,6 +424,62 @@ fn invalid_overrides() {
 }
 
 #[test]
+fn media_scatter_light_along_paths_alone() {
+    let read = |text: &str| {
+        let text = format!("input.path = \"a\"\n{text}");
+        Manifest::parse_with_warnings(&text, path(), Vec::new()).map_err(|e| e.to_string())
+    };
+    let murky = "scattering = [1, 0.5, 0], scattering_length = 0.1, anisotropy = 0.8";
+    let (manifest, warnings) =
+        read(&format!("material = {{ type = \"water\", {murky} }}")).unwrap();
+    let found = (manifest.material.scattering_length, manifest.material.anisotropy);
+    assert_eq!((found, warnings.len()), ((Some(0.1), 0.8), 0));
+    let style = |kind: &str| {
+        format!("style = [{{ draw = \"smooth\", material = {{ type = \"{kind}\", {murky} }} }}]")
+    };
+    let (manifest, _) = read(&style("water")).unwrap();
+    let own = manifest.styles[0].material.as_ref().unwrap();
+    let own = own.as_material(&manifest.material, 1.33);
+    assert_eq!((own.scattering_length, own.anisotropy), found);
+    // Whitted's model refuses them, whoever chose it
+    for whitted in ["render.integrator = \"whitted\"", "material.shininess = 5"] {
+        let clear = "material.type = \"glass\"\nmaterial.scattering = \"white\"";
+        let error = read(&format!("{clear}\n{whitted}")).unwrap_err();
+        let expected =
+            "material.scattering: render.integrator = \"whitted\" does not follow the light";
+        assert!(error.contains(expected), "{error}");
+        let none = read(&format!("{}\n{whitted}", clear.replace("white", "black")));
+        none.unwrap();
+        let error = read(&format!("{}\n{whitted}", style("glass"))).unwrap_err();
+        assert!(error.contains("style.0.material.scattering: render.integrator"), "{error}");
+    }
+    // Light does not enter other materials
+    let (_, warnings) = read("material.scattering = \"white\"").unwrap();
+    let expected = "material.scattering: has no effect: light does not enter this material";
+    assert!(warnings.len() == 1 && warnings[0].contains(expected), "{warnings:?}");
+    let (_, warnings) = read(&style("metal")).unwrap();
+    assert!(warnings.len() == 1 && warnings[0].contains("scattering: has no effect"));
+    // Values out of range
+    for (key, value) in [
+        ("scattering_length", "0"),
+        ("scattering_length", "-1"),
+        ("scattering_length", "nan"),
+        ("scattering_length", "1e60"),
+        ("scattering_length", "inf"),
+        ("scattering", "[-0.1, 0, 0]"),
+        ("scattering", "[1.5, 0, 0]"),
+        ("scattering", "[nan, 0, 0]"),
+        ("anisotropy", "0.96"),
+        ("anisotropy", "-1"),
+        ("anisotropy", "nan"),
+    ] {
+        let error =
+            read(&format!("material = {{ type = \"water\", {key} = {value} }}")).unwrap_err();
+        assert!(error.contains(&format!("material.{key}: ")), "{value}: {error}");
+    }
+}
+
+#[test]
 fn both_branches_are_followed_to_a_bounded_depth() {
     let glass = "[input]\npath = \"a\"\n[material]\ntransmission = 0.5\n";
     let with = |render: &str| {
