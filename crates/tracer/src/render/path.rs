@@ -55,10 +55,6 @@ const ROULETTE_START: u32 = 2;
 /// Greatest probability with which a path continues then, so that paths between white surfaces end.
 const MAX_CONTINUATION: f32 = 0.95;
 
-/// The same for paths in media, which scatter light many times before it leaves: with the probability above, few paths
-/// would have all its weight. Tuned on balls of milk.
-const MAX_SCATTERING: f32 = 0.99;
-
 /// See the module.
 pub(super) struct PathIntegrator<'a> {
     context: RenderContext<'a>,
@@ -479,8 +475,8 @@ impl PathIntegrator<'_> {
             // It may hit a light, or pass through transmissive surfaces
             _ => 0,
         };
-        let most = MAX_CONTINUATION;
-        let deeper = self.roulette(surface, lanes & !last, most, &mut rays.throughput);
+        let throughput = &mut rays.throughput;
+        let deeper = self.roulette(surface, lanes & !last, MAX_CONTINUATION, throughput);
         let how =
             Continuation { inside: segments.inside, crossed: BodySet::EMPTY, branch: BOUNCED };
         if self.catcher.as_ref().is_some_and(|catcher| catcher.is_mirrored) {
