@@ -12,22 +12,17 @@ fn first_of(state: State) -> u32 { return select(BOUNCE_FIRST, NOTHING_FIRST, st
 
 fn seed_of(pixel: u32, state: State) -> Wide { return seed_at(pixel, stage.depth - 1u, BOUNCED); }
 
-fn bounced(state: State) -> State { return state; }
+fn bounced(state: State, start: vec3<f32>) -> State { return state; }
 
 fn stored_state(i: u32) -> State { return State(0u); }
 
-fn store_state(place: u32, state: State) { }
-
-fn take_kept(pixel: u32, state: State) -> Next { return no_ray(state); }
-
-fn has_kept(state: State) -> bool { return false; }
+fn store_state(place: u32, pixel: u32, state: State) { }
 
 fn count_refracted(next: Next) { }
 
-struct Scattered { seen: vec3<f32>, next: Next }
-
 fn absorbed(path: Path, ray: Ray, hit: Hit, surface: Surface) -> vec3<f32> { return path.throughput; }
 
-fn scatter(path: Path, throughput: vec3<f32>, ray: Ray, surface: Surface) -> Scattered {
-  return Scattered(vec3<f32>(0.0), no_ray(path.state));
-}
+fn go_on(
+  is_hit: bool, path: Path, throughput: vec3<f32>, ray: Ray, surface: Surface, next: ptr<function, Next>,
+  sum: ptr<function, vec4<f32>>,
+) { }

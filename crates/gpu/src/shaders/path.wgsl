@@ -208,7 +208,7 @@ fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide, pixel: u
 fn next_ray(vertex: Vertex, weight: vec3<f32>, seed: Wide, state: State) -> Next {
   let sample = sample_bsdf(vertex.finish, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, current.sample));
   let is_ray = sample.pdf > 0.0;
-  return Next(is_ray, vertex.start, sample.direction, weight * sample.weight, sample.pdf, bounced(state));
+  return Next(is_ray, sample.direction, weight * sample.weight, sample.pdf, bounced(state, vertex.start));
 }
 
 // Ends long paths at random, and makes up for it.
@@ -216,7 +216,7 @@ fn roulette(next: Next, bounces: u32, seed: Wide) -> Next {
   if (bounces < ROULETTE_START) { return next; }
   let chance = min(largest_of(next.throughput), MAX_CONTINUATION);
   let goes_on = number_1d(seed, CONTINUATION, current.sample) < chance;
-  return Next(next.is_ray && goes_on, next.origin, next.direction, next.throughput / chance, next.pdf, next.state);
+  return Next(next.is_ray && goes_on, next.direction, next.throughput / chance, next.pdf, next.state);
 }
 
 // The light group of what is behind everything
@@ -395,23 +395,17 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
     }
   }
   push_shadow(OF_LAST, shadow, path.pixel);
-  // Clear spheres reflect and refract rays; where a path ends, one that was kept goes on
-  if (HAS_GLASS && is_sphere) {
-    let scattered = scatter(path, absorbed(path, ray, hit, surface), ray, surface);
-    sum += vec4<f32>(scattered.seen, 0.0);
-    next = scattered.next;
-  }
-  if (is_ray && !next.is_ray && has_kept(path.state)) { next = take_kept(path.pixel, path.state); }
+  go_on(is_sphere, path, absorbed(path, ray, hit, surface), ray, surface, &next, &sum);
   count_refracted(next);
   let place = append(queue_of(stage.depth), next.is_ray);
   if (next.is_ray) {
-    next_rays[RAY * place] = vec4<f32>(next.origin, bitcast<f32>(path.pixel));
+    next_rays[RAY * place] = vec4<f32>(vertex.start, bitcast<f32>(path.pixel));
     next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
     if (HAS_MIRRORS) {
       next_rays[RAY * place + 3u] = vec4<f32>(diffuse_along(vertex, next.direction), 0.0);
     }
-    store_state(place, next.state);
+    store_state(place, path.pixel, next.state);
   }
   if (is_ray) {
     add_light(path.pixel, sum, direct, bounces);

@@ -42,16 +42,16 @@ fn mirrored(path: Path, ray: Ray, surface: Surface) -> Next {
   let weight = path.throughput * (view.reflection * fresnel_of(cosine, ratio).reflectance);
   let along = ray.direction + scaled(surface.normal, 2.0 * cosine);
   let direction = scaled(along, inverse(root(dot_in_order(along, along))));
-  return Next(weight.x > 0.0, surface.start, direction, weight, FAR, path.state);
+  return Next(weight.x > 0.0, direction, weight, FAR, path.state);
 }
 
 // Without glass, the throughput is grey.
-fn store_ray(place: u32, next: Next, pixel: u32) {
-  next_rays[RAY * place] = vec4<f32>(next.origin, bitcast<f32>(pixel));
+fn store_ray(place: u32, start: vec3<f32>, next: Next, pixel: u32) {
+  next_rays[RAY * place] = vec4<f32>(start, bitcast<f32>(pixel));
   next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.throughput.x);
   if (HAS_GLASS) {
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
-    store_state(place, next.state);
+    store_state(place, pixel, next.state);
   }
 }
 
@@ -88,11 +88,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
     albedo = throughput * clamp(base_color(hit.index), vec3<f32>(0.0), vec3<f32>(1.0));
     sum += vec4<f32>(albedo * view.ambient, 0.0);
     // The rays that leave it
-    if (HAS_GLASS) {
-      let scattered = scatter(path, throughput, ray, surface);
-      sum += vec4<f32>(scattered.seen, 0.0);
-      next = scattered.next;
-    } else if (view.reflection > 0.0) {
+    if (!HAS_GLASS && view.reflection > 0.0) {
       next = mirrored(path, ray, surface);
       if (stage.depth >= view.max_depth) {
         sum += vec4<f32>(next.throughput * background(next.direction), 0.0);
@@ -100,11 +96,11 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
       }
     }
   }
-  if (is_ray && !next.is_ray && has_kept(path.state)) { next = take_kept(pixel, path.state); }
+  go_on(is_hit, path, throughput, ray, surface, &next, &sum);
   let queue = queue_of(stage.depth);
   count_refracted(next);
   let place = append(queue, next.is_ray);
-  if (next.is_ray) { store_ray(place, next, pixel); }
+  if (next.is_ray) { store_ray(place, surface.start, next, pixel); }
   // The light of each source, or its shadow ray
   for (var number = 0u; number < view.light_count; number++) {
     let source = view.lights[number];
