@@ -184,9 +184,9 @@ fn stored_as(setup: &Setup, sequence: &Sequence, index: usize) -> Option<(Encodi
     Some((encoding, radius.common.is_some()))
 }
 
-/// What the memory for `particles` of the largest frame depends on: frames that are traced in place stay coded if they are
-/// large, and if all of them are.
-fn need_of(setup: &Setup, sequence: &Sequence, particles: u64) -> TreeNeed {
+/// What the memory for `particles` of the largest frame depends on, with arrays of so many bytes. Frames that are traced in
+/// place stay coded if they do not fit otherwise, and if all of them can.
+fn need_of(setup: &Setup, sequence: &Sequence, particles: u64, max_array: u64) -> TreeNeed {
     let rules = &setup.picture.particles;
     let decoded = TreeNeed {
         count: particles,
@@ -196,12 +196,10 @@ fn need_of(setup: &Setup, sequence: &Sequence, particles: u64) -> TreeNeed {
     };
     let stored = |index| stored_as(setup, sequence, index);
     let Some(first) = stored(0) else { return decoded };
-    let is_small = particles <= u64::from(u32::MAX) / 64;
-    if !is_small && (1..sequence.frames().len()).any(|index| stored(index) != Some(first)) {
-        return decoded;
-    }
     let (encoding, is_common) = first;
-    TreeNeed { is_common, encoding, ..decoded }
+    let need = TreeNeed { is_common, encoding, ..decoded };
+    let are_equal = || (1..sequence.frames().len()).all(|index| stored(index) == Some(first));
+    if need.keeps_codes(max_array) && !are_equal() { decoded } else { need }
 }
 
 /// Whether a job that may choose its device is rendered on a GPU; `particles` are those of its largest frame.
@@ -221,7 +219,8 @@ pub fn suits(setup: &Setup, sequence: &Sequence, particles: u64) -> Result<(), O
     if *is_software {
         return Err(Some(format!("{name} is a program on the CPU")));
     }
-    let most = need_of(setup, sequence, particles).most_within(*max_array);
+    let need = need_of(setup, sequence, particles, *max_array);
+    let most = need.max_count(*max_array);
     if particles > most {
         return Err(Some(format!("a frame has {particles} particles, and {name} takes {most}")));
     }
@@ -282,7 +281,7 @@ pub fn device_bytes(setup: &Setup, sequence: &Sequence, particles: u64) -> u64 {
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
     let of_pixels = bytes_per_pixel(&picture.scene, &picture.render) * pixels;
     let max_array = device().map_or(u64::MAX, |device| device.adapter().max_array);
-    need_of(setup, sequence, particles).bytes(max_array)
+    need_of(setup, sequence, particles, max_array).bytes(max_array)
         + bytes_of_color(setup) * particles
         + of_pixels
         + detail_bytes(setup)
@@ -389,13 +388,17 @@ fn upload(
             let displacements = shutter.map(|shutter| expose(setup, shutter, &mut frame));
             let shading = particle_shading(&setup.picture, &frame.shading);
             let displacements = displacements.as_deref();
-            renderer.prepare(&spheres(&frame), displacements, &shading).map_err(failed)?;
+            let is_clear = setup.picture.scene.particle_material().transmission > 0.0;
+            let spheres = spheres(&frame);
+            renderer.prepare(&spheres, displacements, &shading, is_clear).map_err(failed)?;
             Ok(BuiltParticles::Decoded(frame.shading))
         }
         LoadedParticles::Stored(stored) => {
             let shading = stored.shading(&setup.picture, DEFAULT_COLOR);
             let leaves = stored.leaves()?;
-            renderer.prepare_stored(&leaves, stored.radius(), &shading).map_err(failed)?;
+            let is_clear = setup.picture.scene.particle_material().transmission > 0.0;
+            let radius = stored.radius();
+            renderer.prepare_stored(&leaves, radius, &shading, is_clear).map_err(failed)?;
             drop(shading);
             // Reject the frame if its file has changed meanwhile
             stored.check()?;
@@ -481,7 +484,7 @@ mod tests {
             let shading = ParticleShading::constant(Vec3::ONE);
             let (mut film, never) = (Film::default(), AtomicBool::new(false));
             let renderer = renderer.ready()?;
-            renderer.prepare(&spheres, None, &shading).map_err(failed)?;
+            renderer.prepare(&spheres, None, &shading, false).map_err(failed)?;
             let rendered = renderer.render_into(&mut film, &scene, &shading, &settings, &never);
             rendered.map_err(scene_failed).map(|_| film.color)
         };

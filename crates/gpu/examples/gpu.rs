@@ -75,7 +75,7 @@ fn host_times(
     let [mut copy, mut render] = [0.0; 2];
     for number in 0..2 * PICTURES {
         let start = std::time::Instant::now();
-        renderer.prepare(&particles.spheres(), None, shading).expect("the frame fits");
+        renderer.prepare(&particles.spheres(), None, shading, false).expect("the frame fits");
         let copied = start.elapsed();
         (renderer.render_into(&mut film, &scene, shading, &settings, &never)).expect("it renders");
         if number >= PICTURES {
@@ -93,7 +93,7 @@ fn measure(renderer: &mut SceneRenderer, case: &Case) {
     let never = std::sync::atomic::AtomicBool::new(false);
     let [mut build, mut trace, mut wall] = [0.0; 3];
     let mut bytes = 0;
-    renderer.prepare(&particles.spheres(), None, &shading).expect("the frame fits");
+    renderer.prepare(&particles.spheres(), None, &shading, false).expect("the frame fits");
     for number in 0..WARM_UP + PICTURES {
         let start = std::time::Instant::now();
         let scene = support::scene(case, 0.02 * ((number % PICTURES) as f64 - 15.0));

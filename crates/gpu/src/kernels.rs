@@ -73,13 +73,15 @@ impl Variant {
     /// What a picture of a tree needs.
     pub(crate) fn of(picture: &Picture<'_>, shape: &TreeShape, has_opacity: bool) -> Self {
         let has_glass = picture.kept_rays().is_some();
+        let has_mirrors = picture.ray_kinds().has_mirrors;
+        assert!(!has_glass || !has_mirrors, "clear spheres are no mirrors");
         Self {
             colors_have_opacity: has_opacity,
             has_paths: picture.has_paths(),
             has_opacity: has_opacity && !has_glass,
             has_clamp: picture.has_clamp(),
             has_detail: picture.detail().is_some(),
-            has_mirrors: picture.ray_kinds().has_mirrors,
+            has_mirrors,
             has_objects: picture.has_objects,
             has_layers: picture.light_groups.is_some(),
             has_glass,
@@ -110,28 +112,28 @@ impl Variant {
     }
 }
 
-impl Kernels {
-    /// Compiles the kernels.
-    ///
-    /// `part` is the constant that divides coded centres between two arrays.
-    pub(crate) fn new(device: &Device, variant: Variant, part: &str) -> Self {
+impl Variant {
+    /// The source of the kernels. `part` is the constant that divides coded centres between two arrays.
+    fn source(self, device: &Device, part: &str) -> String {
         let append = if device.has_subgroups() {
             include_str!("shaders/append_subgroup.wgsl")
         } else {
             include_str!("shaders/append_atomic.wgsl")
         };
-        let motion = if variant.has_motion {
+        let motion = if self.has_motion {
             include_str!("shaders/moving.wgsl")
         } else {
             include_str!("shaders/still.wgsl")
         };
-        let glass: &[&str] = match (variant.has_glass, variant.is_rough) {
-            (false, _) => &[include_str!("shaders/opaque.wgsl")],
-            (true, false) => &SMOOTH_GLASS,
-            (true, true) => &ROUGH_GLASS,
+        let glass: &[&str] = if self.is_rough {
+            &ROUGH_GLASS
+        } else if self.has_glass {
+            &SMOOTH_GLASS
+        } else {
+            &[include_str!("shaders/opaque.wgsl")]
         };
-        let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
-        let spheres = match variant.kept_encoding {
+        let model = if self.has_paths { &PATHS[..] } else { &WHITTED };
+        let spheres = match self.kept_encoding {
             None => include_str!("shaders/decoded_spheres.wgsl").to_owned(),
             Some(encoding) => [
                 part,
@@ -141,12 +143,12 @@ impl Kernels {
             ]
             .concat(),
         };
-        let source = [
+        [
             device.arithmetic().source(),
-            &tree_constants(variant.is_common),
+            &tree_constants(self.is_common),
             motion,
             &spheres,
-            &variant.constants(),
+            &self.constants(),
             GROUPS,
             include_str!("shaders/view.wgsl"),
             include_str!("shaders/arithmetic.wgsl"),
@@ -163,8 +165,17 @@ impl Kernels {
             append,
             &glass.concat(),
             &model.concat(),
-        ];
-        let module = device.module(&source.concat());
+        ]
+        .concat()
+    }
+}
+
+impl Kernels {
+    /// Compiles the kernels.
+    ///
+    /// `part` is the constant that divides coded centres between two arrays.
+    pub(crate) fn new(device: &Device, variant: Variant, part: &str) -> Self {
+        let module = device.module(&variant.source(device, part));
         let kernel = |entry, bindings: &[u32]| Kernel::new(device, &module, entry, bindings);
         let of_motion: &[u32] = if variant.has_motion { &[22] } else { &[] };
         let of_spheres: &[u32] = match variant.kept_encoding {
@@ -172,11 +183,8 @@ impl Kernels {
             Some(_) => &[24, 25, 26, 27],
         };
         // Rays that glass ends see the background, which is a part of the light
-        let [of_glass, of_next]: [&[u32]; 2] = match (variant.has_glass, variant.has_paths) {
-            (false, _) => [&[], &[]],
-            (true, true) => [&[23], &[23]],
-            (true, false) => [&[23], &[21, 23]],
-        };
+        let of_glass: &[u32] = if variant.has_glass { &[23] } else { &[] };
+        let of_end: &[u32] = if variant.has_glass && !variant.has_paths { &[21] } else { &[] };
         let tracing =
             |entry, bindings: &[u32]| kernel(entry, &[bindings, of_spheres, of_motion].concat());
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
@@ -195,7 +203,7 @@ impl Kernels {
         Self {
             empty_queues: kernel("empty_queues", &[8, 13, 14]),
             trace_camera: tracing("trace_camera", &[camera, of_glass].concat()),
-            trace_next: tracing("trace_next", &[next, of_next].concat()),
+            trace_next: tracing("trace_next", &[next, of_glass, of_end].concat()),
             trace_shadow: tracing("trace_shadow", shadow),
             clamp_indirect: (variant.has_clamp)
                 .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18, 21])),

@@ -238,7 +238,7 @@ pub struct Material {
     pub transmission: f32,
     /// Extinction in the medium of a sphere, per unit of length.
     pub extinction: [f32; 3],
-    /// The length after which the medium of each sphere has its colour instead.
+    /// The length after which white light has the colour of the sphere, too.
     pub color_length: Option<f32>,
 }
 
@@ -482,7 +482,7 @@ impl View {
             extinction: material.extinction,
             transmission: material.transmission,
             split_weight: picture.split_weight,
-            color_length: material.color_length.unwrap_or_default(),
+            color_length: material.color_length.unwrap_or(-1.0),
             kept: picture.kept_rays().unwrap_or_default(),
             queues: picture.ray_kinds().queues(),
             lights,

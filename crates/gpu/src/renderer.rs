@@ -23,7 +23,7 @@ use crate::{Device, GpuError};
 const GROUP: u64 = 64;
 /// Counters of the light that is lost.
 const LOST_WORDS: usize = 2;
-/// Largest number of stages whose time is measured; pictures with more samples have several in a stage.
+/// Largest number of stages whose time is kept; pictures of opaque spheres with more samples have several in a stage.
 const MAX_STAGES: u32 = 1025;
 /// Depths between two questions whether the rays of all pixels have ended, if spheres are transmissive. The last of these
 /// depths writes the same queue as the first.
@@ -74,6 +74,8 @@ pub struct Renderer {
     traced: Option<Traced>,
     /// Number of stages whose time was measured for it.
     stages: u32,
+    /// Seconds of stages before these.
+    seconds_before: f64,
 }
 
 /// What is known of a picture on the device.
@@ -107,7 +109,7 @@ struct TraceArrays {
     objects: Array,
     layers: Array,
     kept: Array,
-    /// The version of the tables that these three hold.
+    /// The version of the tables of the environment and of materials that the arrays hold.
     tables: Option<u64>,
 }
 
@@ -230,6 +232,7 @@ impl Renderer {
             color: [0.0; 3],
             traced: None,
             stages: 0,
+            seconds_before: 0.0,
         }
     }
 
@@ -301,7 +304,7 @@ impl Renderer {
             0 => picture.samples.count.div_ceil(MAX_STAGES - 1).max(1),
             _ => 1,
         };
-        self.stages = 1;
+        (self.stages, self.seconds_before) = (1, 0.0);
         for samples in plan.samples.chunks(per_stage as usize) {
             if is_stopped() {
                 device.wait()?;
@@ -311,7 +314,7 @@ impl Renderer {
             for sample in samples {
                 self.add_sample(&mut commands, &self.kernels[&variant], &plan, *sample);
             }
-            self.submit_stage(commands);
+            self.submit_stage(device, commands)?;
             self.trace_kept(device, &plan, variant, samples, is_stopped)?;
         }
         let mut commands = Commands::new(device);
@@ -329,12 +332,20 @@ impl Renderer {
         device.check()
     }
 
-    /// Starts the dispatches of a stage, whose time is measured unless there are too many.
-    fn submit_stage(&mut self, mut commands: Commands<'_>) {
-        let timer = self.timer.as_ref().filter(|_| self.stages < MAX_STAGES);
-        commands.end_stage(timer.map(|timer| (timer, self.stages)));
+    /// Starts the dispatches of a stage, whose time is measured. If that of no more stages can be kept, adds up those so far.
+    fn submit_stage(
+        &mut self,
+        device: &Device,
+        mut commands: Commands<'_>,
+    ) -> Result<(), GpuError> {
+        if let (MAX_STAGES, Some(timer)) = (self.stages, &self.timer) {
+            self.seconds_before += timer.seconds(device, MAX_STAGES)?.iter().skip(1).sum::<f64>();
+            self.stages = 1;
+        }
+        commands.end_stage(self.timer.as_ref().map(|timer| (timer, self.stages)));
         commands.submit();
-        self.stages = (self.stages + 1).min(MAX_STAGES);
+        self.stages += 1;
+        Ok(())
     }
 
     /// Traces what is left of a sample with transmissive spheres, until the rays of all pixels have ended.
@@ -360,7 +371,7 @@ impl Renderer {
             let kernels = &self.kernels[&variant];
             self.add_count(&mut commands, kernels, plan);
             self.add_depths(&mut commands, kernels, plan, *sample, 1);
-            self.submit_stage(commands);
+            self.submit_stage(device, commands)?;
         }
     }
 
@@ -431,7 +442,7 @@ impl Renderer {
         let arrays = self.arrays.all().iter().map(|array| array.bytes()).sum::<u64>();
         Ok(Cost {
             build_seconds: seconds.first().copied().unwrap_or_default(),
-            trace_seconds: seconds.iter().skip(1).sum(),
+            trace_seconds: self.seconds_before + seconds.iter().skip(1).sum::<f64>(),
             primary_rays: pixels * u64::from(samples),
             reflected_rays: of_queue(0) - refracted,
             refracted_rays: refracted,
@@ -611,7 +622,12 @@ impl Renderer {
             20 => &arrays.objects,
             21 => &arrays.layers,
             23 => &arrays.kept,
-            _ => return self.tree.traversal_array(binding).expect("1 to 3 are those of the tree"),
+            _ => {
+                return self
+                    .tree
+                    .traversal_array(binding)
+                    .expect("the others are those of the tree");
+            }
         };
         array.binding()
     }

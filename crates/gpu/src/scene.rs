@@ -8,7 +8,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
     DeviceHit, DeviceLight, DeviceObject, DevicePixel, DevicePixels, Extent, extent_of,
-    needs_light_parts, needs_photons, store_pixels,
+    mirrors_see_through, needs_light_parts, needs_photons, store_pixels,
 };
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
@@ -91,6 +91,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     let is_whitted = settings.integrator == IntegratorKind::Whitted;
     let has_extent = |light: &scene::Light| light.kind.has_extent();
     let is_clear = material.transmission > 0.0;
+    let is_glossy = mirrors_see_through(scene, settings);
     let is_style = |of: &scene::Material| matches!(of.owner, Owner::Style(_) | Owner::Part(_));
     let has_styles = scene.materials.iter().any(is_style);
     let is_plain = |ground: &scene::Ground| {
@@ -99,7 +100,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     [
         (scene.materials.iter().any(scene::Material::scatters), Missing::Scattering),
         (needs_photons(scene, settings), Missing::Photons),
-        (is_clear && has_styles, Missing::StylesInGlass),
+        (is_clear && (has_styles || is_glossy), Missing::StylesInGlass),
         (scene.ground.as_ref().is_some_and(|ground| !is_plain(ground)), Missing::Ground),
         (camera.lens().is_some() && is_whitted, Missing::Lens),
         (camera.stereo().is_some(), Missing::Stereo),
@@ -177,7 +178,7 @@ impl SceneRenderer {
     }
 
     /// Copies `spheres` with the colours of `source` to the device, and starts to build their tree. `displacements`: by how
-    /// far each of them moves while the shutter is open, for scenes with an exposure.
+    /// far each of them moves while the shutter is open, for scenes with an exposure. `is_clear`: they are transmissive.
     ///
     /// # Errors
     /// If they do not fit, or if the device fails.
@@ -186,6 +187,7 @@ impl SceneRenderer {
         spheres: &accel::Spheres<'_>,
         displacements: Option<&[Vec3]>,
         source: &dyn ShadeSource,
+        is_clear: bool,
     ) -> Result<(), GpuError> {
         let radii = match spheres.radius {
             accel::SphereRadius::Common(radius) => Radii::Common(radius),
@@ -193,7 +195,8 @@ impl SceneRenderer {
         };
         let order = Order::Any(key_length(spheres.centers));
         let centers = Centers::Points(bytemuck::cast_slice(spheres.centers));
-        let keeps_copies = source.is_translucent();
+        // Light passes each copy of a sphere
+        let keeps_copies = source.is_translucent() || is_clear;
         let displacements = displacements.map(bytemuck::cast_slice);
         let all =
             Spheres { centers, radii, order, displacements, keeps_copies, keeps_codes: false };
@@ -210,6 +213,7 @@ impl SceneRenderer {
         leaves: &StoredLeaves<'_>,
         radius: Option<f32>,
         source: &dyn ShadeSource,
+        is_clear: bool,
     ) -> Result<(), GpuError> {
         let grids = grids_of(leaves);
         let load = |block| leaves.radii.load(block).map(|radii| radii.0);
@@ -237,7 +241,7 @@ impl SceneRenderer {
             order: Order::AlongCurve,
             displacements: None,
             keeps_codes,
-            keeps_copies: source.is_translucent(),
+            keeps_copies: source.is_translucent() || is_clear,
         };
         let count = usize::try_from(leaves.count).unwrap_or(usize::MAX);
         self.start(&spheres, count, source)

@@ -288,8 +288,13 @@ impl TreeArrays {
 /// Centres in a block of a native frame.
 const LANES: u64 = 16;
 
-/// Coded blocks whose boxes are computed together: 1.6 GB.
-const BLOCKS_OF_PART: usize = 1 << 26;
+/// Bytes of the box of a block.
+const BYTES_OF_BOX: u64 = 24;
+
+/// Coded blocks whose boxes are computed together, with arrays of so many bytes: a multiple of [`WIDTH`], 1.6 GB at most.
+fn blocks_of_part(max_array: u64) -> u64 {
+    (max_array / BYTES_OF_BOX / WIDTH * WIDTH).clamp(WIDTH, 1 << 26)
+}
 
 /// Words of coded centres in an array of so many bytes: whole blocks in both encodings. Their numbers have 32 bits.
 const fn largest_part(max_array: u64) -> u64 {
@@ -333,7 +338,7 @@ impl TreeNeed {
     }
 
     /// The largest number of such spheres that a device with arrays of so many bytes holds.
-    pub fn most_within(&self, max_array: u64) -> u64 {
+    pub fn max_count(&self, max_array: u64) -> u64 {
         let coded = Self { count: u64::MAX, ..*self };
         if !coded.keeps_codes(max_array) {
             return spheres_within(max_array);
@@ -351,7 +356,8 @@ impl TreeNeed {
         let of_grids = if encoding.words() == 48 { 0 } else { size_of::<Grid>() as u64 };
         let of_centers = (4 * encoding.words() + of_grids) * count.div_ceil(LANES);
         if self.keeps_codes(max_array) {
-            return of_centers + nodes + 48 * blocks.min(BLOCKS_OF_PART as u64);
+            let boxes = 2 * BYTES_OF_BOX * blocks.min(blocks_of_part(max_array));
+            return of_centers + nodes + boxes;
         }
         let radii = if is_common { 0 } else { 4 + 4 };
         let of_spheres = (2 * 8 + radii) * count + BYTES_OF_SPHERE * blocks * BLOCK;
@@ -372,7 +378,8 @@ impl TreeBuilder {
             shape: TreeShape::default(),
             order: Order::AlongCurve,
             part_words: largest_part(device.adapter().max_array),
-            blocks_of_part: BLOCKS_OF_PART,
+            blocks_of_part: usize::try_from(blocks_of_part(device.adapter().max_array))
+                .expect("at most 2^26"),
         }
     }
 

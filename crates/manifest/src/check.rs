@@ -79,8 +79,8 @@ pub(super) const RULES: &[Rule] = rules! {
 
 const OPAQUE: &str =
     "has no effect: light does not enter this material; set type = \"glass\" or \"water\"";
-const NOT_FOLLOWED: &str = "render.integrator = \"whitted\" does not follow the light that media scatter; choose \"path\" (--integrator path), \
-     or leave it out";
+const NOT_FOLLOWED: &str = "render.integrator = \"whitted\" does not follow the light that media scatter; \
+     choose \"path\" (--integrator path), or leave it out";
 
 impl Manifest {
     /// Checks the rules between keys of different tables, for a manifest that was made or changed by a program.
@@ -197,11 +197,14 @@ impl Manifest {
             Some((format!("style.{number}.material"), own.scattering, own.is_clear()))
         });
         for (table, scattering, is_clear) in std::iter::once(of_rest).chain(of_styles) {
+            if scattering == Vec3::ZERO {
+                continue;
+            }
             let key = format!("{table}.scattering");
-            match (scattering == Vec3::ZERO, is_clear, self.integrator()) {
-                (true, ..) | (false, true, IntegratorKind::Path) => {}
-                (false, false, _) => root.warn(&key, OPAQUE),
-                (false, true, IntegratorKind::Whitted) => root.wrong(&key, NOT_FOLLOWED),
+            if !is_clear {
+                root.warn(&key, OPAQUE);
+            } else if self.integrator() == IntegratorKind::Whitted {
+                root.wrong(&key, NOT_FOLLOWED);
             }
         }
     }

@@ -370,9 +370,9 @@ impl Style {
             /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption, scattering and others
             ///
             /// The keys of glass and water are those of [material]: ior, absorption, absorption_length, scattering,
-            /// scattering_length and anisotropy. The types are matte, plastic, metal, glass, water, and thin-glass for walls: a body that light passes without
-            /// refraction. With underlay = true it is drawn behind everything else. Where bodies of glass and water overlap, the
-            /// first style fills the space.
+            /// scattering_length and anisotropy. The types are matte, plastic, metal, glass, water, and thin-glass for
+            /// walls: a body that light passes without refraction. With underlay = true it is drawn behind everything
+            /// else. Where bodies of glass and water overlap, the first style fills the space.
             material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),
                 unset("that of [material] if it is opaque, else matte");
             /// Shape of grains: ellipsoid | superquadric | capsule | cylinder | cuboid | mesh | convex-hull

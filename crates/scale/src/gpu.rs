@@ -27,7 +27,7 @@ pub(super) fn build_and_trace(request: &CellRequest) -> Result<Measured, CellErr
     let particles = peaks.during(|| Particles::of(request))?;
     let shading = ParticleShading::constant(DEFAULT_COLOR);
     renderer
-        .prepare(&particles.spheres(), None, &shading)
+        .prepare(&particles.spheres(), None, &shading, false)
         .map_err(|e| CellError::Gpu(e.to_string()))?;
     let load_seconds = start.elapsed().as_secs_f64();
     let count = particles.centers.len() as u64;

@@ -553,7 +553,8 @@ pub(crate) fn prepare(renderer: &mut SceneRenderer, case: &Case) -> Result<(), G
     let particles = Particles::new(case);
     let displacements = particles.displacements.as_deref();
     let map = color_map();
-    renderer.prepare(&particles.spheres(), displacements, &shading(case, &particles, &map))
+    let shading = shading(case, &particles, &map);
+    renderer.prepare(&particles.spheres(), displacements, &shading, case.glass.is_some())
 }
 
 /// The film of the device.
@@ -570,7 +571,8 @@ pub(crate) fn film_of(
     angle: f64,
 ) -> (Film, Cost) {
     let displacements = particles.displacements.as_deref();
-    renderer.prepare(&particles.spheres(), displacements, shading).expect("the frame fits");
+    (renderer.prepare(&particles.spheres(), displacements, shading, case.glass.is_some()))
+        .expect("the frame fits");
     let mut film = Film::default();
     let never = AtomicBool::new(false);
     let cost = renderer
@@ -587,7 +589,8 @@ pub(crate) fn stopped(
 ) -> Result<Cost, SceneError> {
     let (particles, map) = (Particles::new(case), color_map());
     let shading = shading(case, &particles, &map);
-    renderer.prepare(&particles.spheres(), particles.displacements.as_deref(), &shading)?;
+    let displacements = particles.displacements.as_deref();
+    renderer.prepare(&particles.spheres(), displacements, &shading, case.glass.is_some())?;
     let mut film = Film::default();
     renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), stop)
 }

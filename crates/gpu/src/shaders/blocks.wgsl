@@ -40,7 +40,7 @@ fn gather_spheres(
 }
 
 // Boxes of blocks: of the centres with a common radius, which rays add later, otherwise of the spheres. Unless spheres move,
-// no ray sees a copy of the sphere before it, which has the lower index; without this rule, rays would test all opaque
+// no ray sees a copy of the opaque sphere before it, which has the lower index; without this rule, rays would test all
 // particles of a place. The box of a block that has nothing else is empty: its lowest corner is above the highest one.
 @compute @workgroup_size(256)
 fn block_boxes(

@@ -34,9 +34,9 @@ fn straight_transmittance(cosine: f32) -> f32 {
   return view.transmission * (1.0 - reflectance(cosine, inverse(view.ior)));
 }
 
-// Extinction of the medium of a sphere, per unit of length. Its own colour may be what is left after `color_length`.
+// Extinction of the medium of a sphere, per unit of length. What is left after `color_length` may have its own colour, too.
 fn extinction_of(index: u32) -> vec3<f32> {
-  if (view.color_length <= 0.0) { return view.extinction; }
+  if (view.color_length < 0.0) { return view.extinction; }
   let loss = -log(clamp(base_color(index), vec3<f32>(1e-6), vec3<f32>(1.0))) / view.color_length;
-  return clamp(loss, vec3<f32>(0.0), vec3<f32>(FAR));
+  return view.extinction + clamp(loss, vec3<f32>(0.0), vec3<f32>(FAR));
 }

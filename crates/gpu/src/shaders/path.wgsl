@@ -2,14 +2,14 @@
 //
 // At each point of a surface, a direction is sampled from the environment and one from the BSDF, weighted by the balance
 // heuristic, and each light is sampled. The path goes on in the direction of the BSDF; from the third reflection on it
-// ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights.
+// ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights. Clear
+// spheres (HAS_GLASS) reflect and refract rays (`glass.wgsl`); light is not sampled there.
 //
 // A ray that goes on has its direction and density, and its throughput beside its origin; also the diffuse part of that
-// if mirrors see the environment through a shadow catcher (HAS_MIRRORS), and where it is in its path if spheres are clear
-// (`glass.wgsl`). A shadow ray has its direction and length, and
-// its radiance. A shadow ray from a shadow catcher takes light away as far as it is blocked, and adds coverage. With
-// layers of light, shadow rays from first surfaces have parts: the diffuse part of the reflection (of a catcher: the part of
-// the light that is lost), and the luminance.
+// if mirrors see the environment through a shadow catcher (HAS_MIRRORS), or where it is in its path if spheres are clear.
+// A shadow ray has its direction and length, and its radiance. A shadow ray from a shadow catcher takes light away as far
+// as it is blocked, and adds coverage. With layers of light, shadow rays from first surfaces have parts: the diffuse part
+// of the reflection (of a catcher: the part of the light that is lost), and the luminance.
 
 const RAY: u32 = 3u + select(0u, 1u, HAS_MIRRORS) + select(0u, 1u, HAS_GLASS);
 const SHADOW: u32 = select(3u, 4u, HAS_LAYERS);

@@ -30,7 +30,7 @@
 // Invocations of a workgroup that follows a queue
 const GROUP: u32 = 64u;
 
-// What differs between the dispatches of a sample. `depth` counts from 1. `last` is the queue of the last depth if rays go
+// What differs between the dispatches of a sample. `depth` counts from 1; with glass, paths may be at other depths. `last` is the queue of the last depth if rays go
 // on behind it, or 0.
 struct Stage { depth: u32, source: u32, counters: u32, last: u32 }
 

@@ -50,7 +50,7 @@ struct View {
   color: vec3<f32>, specular: f32,
   shininess: f32, reflection: f32, ior: f32, is_exact_fresnel: u32,
   // Clear spheres: what their medium absorbs, and the weight of the refracted ray. The least weight of a path that both rays
-  // continue; the length in a medium after which the colour of its sphere is left, or 0; how many rays a pixel keeps; and
+  // continue; the length in a medium after which the colour of its sphere is left, or -1; how many rays a pixel keeps; and
   // the number of queues at each depth
   extinction: vec3<f32>, transmission: f32,
   split_weight: f32, color_length: f32, kept: u32, queues: u32,

@@ -1,8 +1,8 @@
 //! Absorption inside transmissive bodies by the Beer-Lambert law.
 //!
 //! The extinction coefficient of a medium is that of its material, and may have in addition absorption that follows from
-//! the colours of the particles. In that case, a segment of a ray has the mean of the coefficients at its ends (trapezoidal rule). That is exact where the
-//! coefficient varies linearly along the segment; colours between the ends are not seen.
+//! the colours of the particles. In that case, a segment of a ray has the mean of the coefficients at its ends (trapezoidal
+//! rule). That is exact where the coefficient varies linearly along the segment; colours between the ends are not seen.
 
 use glam::Vec3;
 

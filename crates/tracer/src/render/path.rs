@@ -134,6 +134,7 @@ impl Integrator for PathIntegrator<'_> {
         packet.hits.mask &= !ended;
         packet.take_light(LightClass::Emission);
         let scattered = packet.media.scattered & !ended;
+        packet.media.hidden &= scattered;
         // Camera rays that hit nothing see walls of glass
         let unended = segments.lanes() & !(ended | scattered);
         self.context.pass_underlays(segments, depth, unended, self.environment, packet);

@@ -47,7 +47,8 @@ impl SplitRule {
         Self { least, favors_first: matches!(interior, Interior::Body | Interior::Nested) }
     }
 
-    /// Maximum number of rays of one sample at any depth: the path weights of a sample never add up to more than 1.
+    /// Maximum number of rays of one sample at any depth: the path weights of a sample never add up to more than 1. Where
+    /// free paths in coloured media choose a channel, there may be three times as many.
     pub(super) fn max_paths(&self, max_depth: u32) -> usize {
         let by_depth = 1_usize << (max_depth.min(MAX_DEPTH) - 1).min(30);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]

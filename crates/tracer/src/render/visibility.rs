@@ -27,6 +27,9 @@ use spherule_tree::ray::RayPacket;
 /// Maximum number of crossings of one body along a shadow ray.
 const MAX_CROSSINGS: u32 = 64;
 
+/// The same of separate spheres, of which there may be many behind each other.
+const MAX_SPHERE_CROSSINGS: u32 = 4096;
+
 /// Transmittance below which a shadow ray ends.
 const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
 
@@ -152,7 +155,7 @@ impl RenderContext<'_> {
         let mut remaining = *rays;
         remaining.t_max = far;
         let mut from = rays.t_min;
-        for _ in 0..MAX_CROSSINGS {
+        for _ in 0..MAX_SPHERE_CROSSINGS {
             // Find the next crossing of each ray
             remaining.keep_only(alive);
             hits.clear();
@@ -163,8 +166,8 @@ impl RenderContext<'_> {
             for lane in lanes_in(found & leaving(self.simd, rays, hits)) {
                 let length = (hits.t[lane].min(rays.t_max[lane]) - from[lane]).max(0.0);
                 let extinction = self.sphere_extinction(hits.particle[lane]);
-                let kept = extinction.map(|coefficient| exp(-length * coefficient));
-                set_lane3(transmittance, lane, lane3(transmittance, lane) * kept);
+                let passing = extinction.map(|coefficient| exp(-length * coefficient));
+                set_lane3(transmittance, lane, lane3(transmittance, lane) * passing);
             }
             let crossing = lanes_in(found).mask_where(|lane| hits.t[lane] < rays.t_max[lane]);
             cross_straight(self.simd, &self.boundary, rays, hits, crossing, transmittance);
@@ -181,7 +184,8 @@ impl RenderContext<'_> {
                 from[lane] = hits.t[lane];
             }
         }
-        reached
+        // Rays that are still in front of the light have next to none
+        reached & !alive
     }
 
     /// The transmittance of one connected body, crossing after crossing for all rays at once; rays of `inside` start

@@ -2,7 +2,7 @@
 //! refracting surfaces are noise in a picture, so they end at the ground, where two maps have their light:
 //!
 //! - caustics: photons of lights that pass through particles (`emitter.rs`, `photons.rs`, `density.rs`)
-//! - the light of the environment, which varies slowly (`sky.rs`)
+//! - the light of the environment, and light that media scatter, which vary slowly (`sky.rs`)
 //!
 //! A third map shows where the ground is wet (`wet.rs`).
 //!

@@ -178,7 +178,7 @@ impl Task<'_> {
     fn trace(&self, range: std::ops::Range<u32>, stop: &dyn Stop) -> Option<(Arrivals, RayCounts)> {
         let mut arrivals = Arrivals::default();
         let mut packet = Box::<PacketScratch>::default();
-        // Photons that media scatter are left out: paths of the camera find that light
+        // Photons that media scatter are left out: paths of the camera, or of the map of the sky, find that light
         packet.media.only_attenuate = true;
         let (mut current, mut next) = (RayStreams::default(), RayStreams::default());
         // Emit the photons

@@ -175,7 +175,10 @@ fn reflect(
     next: &mut RayStreams,
 ) {
     let context = &integrator.context;
+    // These rays only aim at the ground, also where it is inside a medium
+    packet.media.only_attenuate = true;
     context.intersect(segments, 1, packet);
+    packet.media.only_attenuate = false;
     packet.radiance = [splat(0.0); 3];
     let surface = Surface {
         segments,
