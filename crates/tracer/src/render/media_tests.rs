@@ -138,6 +138,31 @@ fn single_scattering_is_the_integral_along_the_ray() {
     }
 }
 
+/// Light loses a part in each of many spheres behind each other, whether these scatter light or not.
+#[test]
+fn shadow_rays_pass_many_spheres() {
+    let center = |i: u16| Vec3::new(0.0, 0.0, 0.1 + 0.1 * f32::from(i));
+    let column = || (0..60).map(|i| Ball { center: center(i), radius: 0.04 }).collect();
+    let eye = DVec3::new(0.0, -9.0, 9.0);
+    let view = CameraView { eye, look_at: DVec3::ZERO, up: DVec3::Z, fov: 0.05 };
+    let brightness = |scattering: Vec3| {
+        let material = Material { ior: 1.5, ..fog(Vec3::ZERO, scattering, 0.0) };
+        let scene = Scene {
+            camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
+            materials: Scene::basic_materials(material),
+            lights: vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()],
+            ..floor_from_above(dark(), Vec3::ONE)
+        };
+        let settings = RenderSettings { photons: 0, ..settings(8, 16, 0) };
+        middle(&image(&Balls(column()), &scene, Vec3::ONE, &settings), 8)
+    };
+    // Each surface reflects 4 %
+    let expected = Vec3::splat(0.96_f32.powi(120) / PI);
+    for scattering in [Vec3::ZERO, Vec3::splat(1e-5)] {
+        assert_near(brightness(scattering) / expected, Vec3::ONE, 0.05);
+    }
+}
+
 /// A sun with a fifteenth of the sky, as an environment that paths find, with half its angle in radians.
 fn wide_sun() -> (Environment, f64) {
     let rows = 40;
