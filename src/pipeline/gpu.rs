@@ -382,13 +382,13 @@ fn upload(
     setup: &Setup,
     particles: LoadedParticles<'_>,
 ) -> Result<BuiltParticles, TraceError> {
+    let is_clear = setup.picture.scene.particle_material().transmission > 0.0;
     match particles {
         LoadedParticles::Decoded(mut frame) => {
             let shutter = setup.picture.view.shutter;
             let displacements = shutter.map(|shutter| expose(setup, shutter, &mut frame));
             let shading = particle_shading(&setup.picture, &frame.shading);
             let displacements = displacements.as_deref();
-            let is_clear = setup.picture.scene.particle_material().transmission > 0.0;
             let spheres = spheres(&frame);
             renderer.prepare(&spheres, displacements, &shading, is_clear).map_err(failed)?;
             Ok(BuiltParticles::Decoded(frame.shading))
@@ -396,7 +396,6 @@ fn upload(
         LoadedParticles::Stored(stored) => {
             let shading = stored.shading(&setup.picture, DEFAULT_COLOR);
             let leaves = stored.leaves()?;
-            let is_clear = setup.picture.scene.particle_material().transmission > 0.0;
             let radius = stored.radius();
             renderer.prepare_stored(&leaves, radius, &shading, is_clear).map_err(failed)?;
             drop(shading);

@@ -147,7 +147,7 @@ mod tests {
     fn pixels(device: &Device, leaves: &StoredLeaves<'_>, keeps_codes: bool) -> Vec<NearestSample> {
         let grids = grids_of(leaves);
         let mut renderer = Renderer::new(device);
-        // Arrays hold ten blocks, of which four are looked at together
+        // Arrays hold ten blocks of 16 particles, and boxes of eight blocks of the tree are computed together
         renderer.tree_mut().divide(240, 8);
         let spheres = Spheres {
             centers: centers_of(leaves, &grids),

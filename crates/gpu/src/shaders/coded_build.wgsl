@@ -1,13 +1,8 @@
-// The arrays of coded centres for kernels that build a tree. An array holds PART words at most.
+// The arrays of coded centres for kernels that build a tree.
 @group(0) @binding(1) var<storage, read> centers: array<u32>;
 @group(0) @binding(17) var<storage, read> more_centers: array<u32>;
 @group(0) @binding(15) var<storage, read> grids: array<f32>;
 @group(0) @binding(16) var<storage, read> wide: array<f32>;
-
-fn word_at(i: u32) -> u32 {
-  if (i >= PART) { return more_centers[i - PART]; }
-  return centers[i];
-}
 
 fn wide_count() -> u32 { return build.wide_count; }
 

@@ -1,9 +1,14 @@
 // The centres of a native frame whose blocks have 16 bits for each axis (ENCODING 2), or 11, 11 and 10 bits (3). They are on
 // the grid of their block, with the bits of the CPU (`blocks/compact.rs` of the crate for trees).
 //
-// Files that include this one define the arrays: `fn word_at(i: u32) -> u32` of all blocks, `grids` with the place of code 0
-// and the step of the grid on each axis of each block, and `fn wide_count() -> u32` blocks in `wide` that are too coarse
-// for a grid: 16 x, 16 y, 16 z.
+// Files that include this one define the arrays: the words of all blocks, PART of them in `centers` and the others in
+// `more_centers`; `grids` with the place of code 0 and the step of the grid on each axis of each block; and `fn wide_count()
+// -> u32` blocks in `wide` that are too coarse for a grid: 16 x, 16 y, 16 z.
+
+fn word_at(i: u32) -> u32 {
+  if (i >= PART) { return more_centers[i - PART]; }
+  return centers[i];
+}
 
 // The codes of a centre in a block
 fn codes_at(block: u32, lane: u32) -> vec3<u32> {

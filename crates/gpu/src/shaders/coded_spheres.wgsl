@@ -1,13 +1,8 @@
-// Spheres that stay coded: the counterparts of `decoded_spheres.wgsl`. An array holds PART words at most.
+// Spheres that stay coded: the counterparts of `decoded_spheres.wgsl`.
 @group(0) @binding(24) var<storage, read> centers: array<u32>;
 @group(0) @binding(25) var<storage, read> more_centers: array<u32>;
 @group(0) @binding(26) var<storage, read> grids: array<f32>;
 @group(0) @binding(27) var<storage, read> wide: array<f32>;
-
-fn word_at(i: u32) -> u32 {
-  if (i >= PART) { return more_centers[i - PART]; }
-  return centers[i];
-}
 
 fn wide_count() -> u32 { return view.wide_count; }
 

@@ -20,8 +20,13 @@ use crate::scene::{
 /// Rows of the bright cap around the zenith, of 256.
 const CAP_ROWS: usize = 9;
 
-/// A white floor, seen from above. The image shows about 5 by 5 units of it.
+/// A white floor below particles of glass.
 fn floor(environment: Environment) -> Scene {
+    floor_below(GLASS, environment)
+}
+
+/// A white floor below particles of `material`, seen from above. The image shows about 5 by 5 units of it.
+pub(super) fn floor_below(material: Material, environment: Environment) -> Scene {
     let mut scene = floor_from_above(environment, Vec3::ONE);
     let view = CameraView {
         eye: DVec3::new(0.0, 0.0, 10.0),
@@ -30,7 +35,7 @@ fn floor(environment: Environment) -> Scene {
         fov: 28.0,
     };
     scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-    *scene.particle_material_mut() = GLASS;
+    *scene.particle_material_mut() = material;
     if let Some(ground) = &mut scene.ground {
         (ground.fade_start, ground.lit_range) = (12.0, 12.0);
     }

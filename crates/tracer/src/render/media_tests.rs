@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec3, Vec3};
 
 use crate::render::brute::{Ball, Balls};
-use crate::render::ground_light_tests::{dark, sun};
+use crate::render::ground_light_tests::{dark, floor_below, sun};
 use crate::render::layers::LightClass;
 use crate::render::path_tests::{covered, floor_from_above, image, settings, statistics, white};
 use crate::render::phase::henyey_greenstein;
@@ -211,23 +211,6 @@ fn lights_and_the_environment_light_media_alike() {
     }
 }
 
-/// A white floor below a body of `material`, seen from above.
-fn floor(material: Material, environment: Environment) -> Scene {
-    let mut scene = floor_from_above(environment, Vec3::ONE);
-    let view = CameraView {
-        eye: DVec3::new(0.0, 0.0, 10.0),
-        look_at: DVec3::ZERO,
-        up: DVec3::Y,
-        fov: 28.0,
-    };
-    scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-    *scene.particle_material_mut() = material;
-    if let Some(ground) = &mut scene.ground {
-        (ground.fade_start, ground.lit_range) = (12.0, 12.0);
-    }
-    scene
-}
-
 #[test]
 fn photons_bring_no_light_twice() {
     // Without photons, light passes the body straight, which is the same where nothing refracts
@@ -237,7 +220,7 @@ fn photons_bring_no_light_twice() {
     let body = Solid::ball_at(center, 1.0);
     for shape in [&balls as &dyn Shape, &body] {
         let mean = |photons: u32| {
-            let mut scene = floor(material, dark());
+            let mut scene = floor_below(material, dark());
             scene.lights = vec![sun(0.01, Vec3::splat(PI))];
             let settings = RenderSettings { photons, max_depth: 16, ..settings(32, 64, 20) };
             let film = image(shape, &scene, Vec3::ONE, &settings);
@@ -258,7 +241,7 @@ fn a_white_floor_below_media_is_white() {
     let (balls, body) = (Balls::one(center, 1.0), Solid::ball_at(center, 1.0));
     let settings = RenderSettings { max_depth: 24, photons: 1000, ..settings(16, 32, 1000) };
     for shape in [&balls as &dyn Shape, &body] {
-        let film = image(shape, &floor(material, white()), Vec3::ONE, &settings);
+        let film = image(shape, &floor_below(material, white()), Vec3::ONE, &settings);
         let (mean, _) = statistics(&covered(&film));
         assert!((mean - 1.0).abs() < 0.01, "{mean}");
     }
@@ -298,7 +281,7 @@ fn data_channels_are_those_of_clear_glass() {
 fn pictures_do_not_depend_on_threads_and_classes_of_light_add_up() {
     let material =
         Material { ior: 1.3, ..fog(Vec3::new(0.1, 0.2, 0.3), Vec3::new(3.0, 1.0, 0.4), 0.4) };
-    let mut scene = floor(material, Environment::constant(Vec3::splat(0.3)));
+    let mut scene = floor_below(material, Environment::constant(Vec3::splat(0.3)));
     scene.lights = vec![sun(0.1, Vec3::ONE)];
     let settings = RenderSettings {
         channels: Channels::from_names(["lights", "direct", "indirect", "Z", "N", "id"]).unwrap(),

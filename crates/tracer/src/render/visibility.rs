@@ -27,7 +27,7 @@ use spherule_tree::ray::RayPacket;
 /// Maximum number of crossings of one body along a shadow ray.
 const MAX_CROSSINGS: u32 = 64;
 
-/// The same of separate spheres, of which there may be many behind each other.
+/// Maximum number of crossings of separate spheres along a shadow ray, which may pass many of them.
 const MAX_SPHERE_CROSSINGS: u32 = 4096;
 
 /// Transmittance below which a shadow ray ends.
