@@ -10,7 +10,7 @@ use crate::render::{Film, FilmPlane};
 impl TracedFrame {
     /// Denoises the picture if the setup says so.
     pub(super) fn denoise(&mut self, setup: &Setup) -> Result<(), DenoiseError> {
-        self.report.seconds.denoise = denoise_film(setup, &mut self.film)?;
+        self.report.seconds.denoise += denoise_film(setup, &mut self.film)?;
         Ok(())
     }
 }

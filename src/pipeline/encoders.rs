@@ -17,14 +17,13 @@ const PIXEL_SECONDS: f64 = 1.5e-7;
 const IMAGE_SECONDS: f64 = 4e-3;
 /// Seconds of one thread per ray in a frame of few particles.
 const RAY_SECONDS: f64 = 2.5e-7;
-/// The same of a GPU, and its seconds per pixel until the host has read the picture. Time for denoising is not counted:
-/// all threads share it.
+/// The same of a GPU, and its seconds per pixel until the host has read the picture.
 const DEVICE_RAY_SECONDS: f64 = 7e-10;
 const DEVICE_PIXEL_SECONDS: f64 = 1e-8;
 
 impl Setup {
-    /// Whether a picture is denoised by the stage that encodes it: the processor is free while a GPU traces the next one.
-    pub(super) const fn denoises_when_encoding(&self) -> bool {
+    /// Whether an image is finished by the stage that encodes it: the processor is free while a GPU renders the next one.
+    pub(super) const fn finishes_when_encoding(&self) -> bool {
         matches!(self.picture.renderer, RendererKind::Gpu)
     }
 

@@ -4,22 +4,27 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
+use glam::Vec3;
 use spherule_files::memory::MemoryUse;
 use spherule_formats::native::{self, NativeFile};
 use spherule_formats::sequence::Sequence;
 use spherule_gpu::{
-    AdapterSummary, Arithmetic, Checks, Cost, Device, Encoding, GpuError, MAX_FINISHES, Missing,
-    SceneError, SceneRenderer, TreeNeed, bytes_per_pixel, largest_array, missing, ray_counts,
+    AdapterSummary, Arithmetic, Checks, Cost, Device, Encoding, GpuError, HostImage, MAX_FINISHES,
+    Missing, SceneError, SceneRenderer, TreeNeed, bytes_per_pixel, host_bytes_per_pixel,
+    largest_array, missing, ray_counts,
 };
 
 use super::in_place::particles_in_place;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::mattes;
 use super::motion::expose;
-use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
+use super::renderer::{
+    BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame, UnfinishedImage,
+};
 use super::setup::{OpacityRule, ParticleStyle, RadiusRule, Setup, StyleForm};
 use super::shading::particle_shading;
 use super::surface::spheres;
+use crate::denoise::DenoiseSettings;
 use crate::render::{
     Film, IntegratorKind, RayCounts, RenderError, RenderSettings, ShadeSource, Stop,
 };
@@ -112,6 +117,7 @@ fn failed(error: GpuError) -> TraceError {
 fn scene_failed(error: SceneError) -> TraceError {
     match error {
         SceneError::Render(error) => TraceError::Render(error),
+        SceneError::Denoise(error) => TraceError::Denoise(error),
         SceneError::Device(error) => failed(error),
     }
 }
@@ -287,6 +293,11 @@ pub fn device_bytes(setup: &Setup, sequence: &Sequence, particles: u64) -> u64 {
         + detail_bytes(setup)
 }
 
+/// Memory of the host for each pixel of an image that is not finished, bytes.
+pub fn host_bytes(setup: &Setup) -> u64 {
+    host_bytes_per_pixel(&setup.picture.scene, &setup.picture.render)
+}
+
 /// Renders frame after frame on the device.
 #[derive(Debug, Default)]
 pub struct GpuRenderer {
@@ -315,7 +326,7 @@ impl FrameRenderer for GpuRenderer {
         };
         Ok(BuiltFrame {
             task: frame.task,
-            particles,
+            particles: Arc::new(particles),
             meshes: frame.meshes,
             rods: frame.rods,
             facts: frame.facts,
@@ -333,14 +344,12 @@ impl FrameRenderer for GpuRenderer {
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
         let start = Instant::now();
-        let mut film = std::mem::take(&mut self.film);
-        let cost = self.draw(setup, frame, &mut film, stop)?;
+        let (image, cost) = self.draw(setup, frame, setup.picture.denoise, stop)?;
         let memory = MemoryUse::now();
         let mut report = frame.report.clone();
-        report.seconds.trace = start.elapsed().as_secs_f64();
-        let rays = ray_counts(&cost);
-        report.clamped_light = rays.lost.part(&film.color, setup.picture.render.samples);
-        report.rays = rays.into();
+        report.seconds.trace = (start.elapsed().as_secs_f64() - cost.denoise_seconds).max(0.0);
+        report.rays = ray_counts(&cost).into();
+        report.seconds.denoise = cost.denoise_seconds;
         report.build = BuildSummary {
             structure: "lbvh".to_owned(),
             order: "hilbert".to_owned(),
@@ -351,7 +360,8 @@ impl FrameRenderer for GpuRenderer {
         Ok(TracedFrame {
             camera: setup.camera_at(frame.task.frame)?,
             task: frame.task.clone(),
-            film,
+            film: std::mem::take(&mut self.film),
+            rest: Some(Box::new(image)),
             texts: mattes::attributes_of(setup, frame),
             facts: frame.facts.clone(),
             time: frame.time,
@@ -366,8 +376,9 @@ impl FrameRenderer for GpuRenderer {
         frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), TraceError> {
+        let (image, cost) = self.draw(setup, frame, None, stop)?;
         let mut film = Film::default();
-        let cost = self.draw(setup, frame, &mut film, stop)?;
+        image.store(setup, &mut film)?;
         Ok((film, ray_counts(&cost)))
     }
 
@@ -419,27 +430,26 @@ impl GpuRenderer {
         &self,
         setup: &Setup,
         frame: &BuiltFrame,
-        film: &mut Film,
+        denoise: Option<DenoiseSettings>,
         stop: &dyn Stop,
-    ) -> Result<Cost, TraceError> {
+    ) -> Result<(DeviceImage, Cost), TraceError> {
         let mut renderer = lock(&self.renderer);
         let Some(renderer) = &mut *renderer else {
             return Err(TraceError::Device("no frame was prepared".to_owned()));
         };
         let scene = setup.scene_at(frame.task.frame, frame.focus)?;
-        // A trial is a small image of all of the scene, whose pixels cost about the same
-        let settings = RenderSettings { mosaic_of: None, ..setup.picture.render };
-        let mut render = |source: &dyn ShadeSource| {
-            renderer.render_into(film, &scene, source, &settings, stop).map_err(scene_failed)
+        let settings = settings_of(setup);
+        let (pixels, cost) = with_source(setup, &frame.particles, |source| {
+            (renderer.render(&scene, source, &settings, denoise, stop)).map_err(scene_failed)
+        })?;
+        let image = DeviceImage {
+            pixels,
+            particles: Arc::clone(&frame.particles),
+            frame: frame.task.frame,
+            focus: frame.focus,
+            rays: ray_counts(&cost),
         };
-        match &frame.particles {
-            BuiltParticles::Decoded(shading) => render(&particle_shading(&setup.picture, shading)),
-            BuiltParticles::Stored(stored) => {
-                let cost = render(&stored.shading(&setup.picture, DEFAULT_COLOR))?;
-                stored.check()?;
-                Ok(cost)
-            }
-        }
+        Ok((image, cost))
     }
 
     fn summary(&self, cost: &Cost) -> DeviceSummary {
@@ -455,11 +465,61 @@ impl GpuRenderer {
     }
 }
 
+/// The settings of pictures. A trial is a small image of all of the scene, whose pixels cost about the same.
+fn settings_of(setup: &Setup) -> RenderSettings {
+    RenderSettings { mosaic_of: None, ..setup.picture.render }
+}
+
+/// Calls `work` with the colours and attributes of `particles`. Fails if their file has changed meanwhile.
+fn with_source<T>(
+    setup: &Setup,
+    particles: &BuiltParticles,
+    work: impl FnOnce(&dyn ShadeSource) -> Result<T, TraceError>,
+) -> Result<T, TraceError> {
+    match particles {
+        BuiltParticles::Decoded(shading) => work(&particle_shading(&setup.picture, shading)),
+        BuiltParticles::Stored(stored) => {
+            let result = work(&stored.shading(&setup.picture, DEFAULT_COLOR))?;
+            stored.check()?;
+            Ok(result)
+        }
+    }
+}
+
+/// An image whose pixels are not in a film yet.
+#[derive(Debug)]
+struct DeviceImage {
+    pixels: HostImage,
+    particles: Arc<BuiltParticles>,
+    frame: i64,
+    focus: Option<Vec3>,
+    rays: RayCounts,
+}
+
+impl DeviceImage {
+    fn store(&self, setup: &Setup, film: &mut Film) -> Result<(), TraceError> {
+        let scene = setup.scene_at(self.frame, self.focus)?;
+        with_source(setup, &self.particles, |source| {
+            let stored = self.pixels.store(film, &scene, source, &settings_of(setup));
+            stored.map_err(TraceError::Render)
+        })
+    }
+}
+
+impl UnfinishedImage for DeviceImage {
+    fn finish(self: Box<Self>, setup: &Setup, frame: &mut TracedFrame) -> Result<(), TraceError> {
+        self.store(setup, &mut frame.film)?;
+        let samples = setup.picture.render.samples;
+        frame.report.clamped_light = self.rays.lost.part(&frame.film.color, samples);
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::atomic::AtomicBool;
 
-    use glam::{DVec3, Vec3};
+    use glam::DVec3;
 
     use super::*;
     use crate::accel::{SphereRadius, Spheres};
@@ -484,7 +544,8 @@ mod tests {
             let (mut film, never) = (Film::default(), AtomicBool::new(false));
             let renderer = renderer.ready()?;
             renderer.prepare(&spheres, None, &shading, false).map_err(failed)?;
-            let rendered = renderer.render_into(&mut film, &scene, &shading, &settings, &never);
+            let rendered =
+                renderer.render_into(&mut film, &scene, &shading, &settings, None, &never);
             rendered.map_err(scene_failed).map(|_| film.color)
         };
         let first = render().unwrap();

@@ -33,7 +33,7 @@ pub(super) fn attributes_of(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttrib
         return Vec::new();
     }
     let (count, picture) = (frame.report.particles, &setup.picture);
-    match &frame.particles {
+    match &*frame.particles {
         BuiltParticles::Decoded(shading) => {
             attributes(setup, &particle_shading(picture, shading), count)
         }

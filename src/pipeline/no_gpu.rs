@@ -45,6 +45,11 @@ pub const fn device_bytes(_setup: &Setup, _sequence: &Sequence, _particles: u64)
     0
 }
 
+/// No memory.
+pub const fn host_bytes(_setup: &Setup) -> u64 {
+    0
+}
+
 /// Fails.
 #[derive(Debug, Default)]
 pub struct GpuRenderer(());

@@ -1,6 +1,7 @@
 //! The interface between the stages of a run and the renderer.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::Vec3;
 use spherule_files::memory::MemoryUse;
@@ -62,6 +63,8 @@ pub struct TracedFrame {
     pub camera: Camera,
     /// The planes.
     pub film: Film,
+    /// What is left to do until they are complete.
+    pub(super) rest: Option<Box<dyn UnfinishedImage>>,
     /// Attributes of the file that describe its layers.
     pub texts: Vec<TextAttribute>,
     /// What overlays show of the file.
@@ -74,11 +77,33 @@ pub struct TracedFrame {
     pub memory: MemoryUse,
 }
 
+impl TracedFrame {
+    /// Completes the planes, and denoises them if the settings say so.
+    ///
+    /// # Errors
+    /// If the planes cannot be denoised, or if a native frame changed in the meantime.
+    pub(super) fn finish(&mut self, setup: &Setup) -> Result<(), TraceError> {
+        if let Some(rest) = self.rest.take() {
+            rest.finish(setup, self)?;
+        }
+        Ok(self.denoise(setup)?)
+    }
+}
+
+/// An image that is no longer in its renderer, and not in the planes of its frame yet.
+pub(super) trait UnfinishedImage: std::fmt::Debug + Send {
+    /// Fills the planes of `frame`.
+    ///
+    /// # Errors
+    /// If a native frame changed in the meantime.
+    fn finish(self: Box<Self>, setup: &Setup, frame: &mut TracedFrame) -> Result<(), TraceError>;
+}
+
 /// A frame whose tree is in the renderer, with the other data for shading.
 #[derive(Debug)]
 pub struct BuiltFrame {
     pub(super) task: ImageTask,
-    pub(super) particles: BuiltParticles,
+    pub(super) particles: Arc<BuiltParticles>,
     pub(super) meshes: Vec<MeshSlices>,
     pub(super) rods: Vec<FrameRods>,
     pub(super) facts: FileFacts,
@@ -118,7 +143,8 @@ pub trait FrameRenderer: Send + Sync {
     /// The frame cannot be rendered: damaged nodes, or a surface that does not fit.
     fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError>;
 
-    /// Renders `frame`, which must be the one prepared last, and leaves its noise. It can be rendered again, also with
+    /// Renders `frame`, which must be the one prepared last. What needs no renderer any more is left to
+    /// [`TracedFrame::finish`]. It can be rendered again, also with
     /// other settings of what does not belong to its particles.
     ///
     /// # Errors
@@ -131,7 +157,7 @@ pub trait FrameRenderer: Send + Sync {
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError>;
 
-    /// The same, and denoises the picture if the settings say so.
+    /// The same, and finishes the image.
     ///
     /// # Errors
     /// Same as [`Self::trace`].
@@ -142,7 +168,7 @@ pub trait FrameRenderer: Send + Sync {
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
         let mut traced = self.trace(setup, frame, stop)?;
-        traced.denoise(setup)?;
+        traced.finish(setup)?;
         Ok(traced)
     }
 

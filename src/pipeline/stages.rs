@@ -4,7 +4,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 
-use rayon::ThreadPool;
 use spherule_files::memory::MemoryPeaks;
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{
@@ -15,8 +14,7 @@ use super::encode::{lock_peaks, write_frame};
 use super::read_threads::ReadThreads;
 use super::record::{AtEncoder, EncodedFrame, NotEncoded, StagedFrame, ToEncoders};
 use super::{
-    FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TraceError, TracedFrame, load_frame,
-    renderer_of,
+    FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TracedFrame, load_frame, renderer_of,
 };
 use crate::render::{Film, Stop};
 use crate::report::FrameReport;
@@ -94,20 +92,9 @@ pub(super) struct TraceStage<'a> {
     pub(super) setup: &'a Setup,
     pub(super) context: &'a RunContext<'a, FrameReport>,
     pub(super) stop: DropFrame<'a>,
-    /// Its own threads, if pictures are denoised while others are traced: in the common pool, its tasks would wait for
-    /// those of the denoiser, and the device for them.
-    pub(super) threads: Option<ThreadPool>,
 }
 
 impl TraceStage<'_> {
-    /// Runs `work` on the threads of this stage.
-    fn in_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
-        match &self.threads {
-            Some(threads) => threads.install(work),
-            None => in_pool(work),
-        }
-    }
-
     /// The neighbouring stages end when this one does, because it owns its ends of all channels.
     pub(super) fn run(
         &self,
@@ -127,7 +114,7 @@ impl TraceStage<'_> {
             let built = result.and_then(|frame| {
                 self.context.report_stage(number, "tracing");
                 let build = || tracer.prepare(self.setup, frame);
-                catch_panic(|| Ok(self.in_pool(build)?)).map_err(failure)
+                catch_panic(|| Ok(in_pool(build)?)).map_err(failure)
             });
             if let Some(is_built) = &is_built {
                 // The reader may have ended
@@ -140,13 +127,13 @@ impl TraceStage<'_> {
                     tracer.recycle(film);
                 }
                 let trace = || {
-                    if self.setup.denoises_when_encoding() {
+                    if self.setup.finishes_when_encoding() {
                         tracer.trace(self.setup, &frame, &self.stop)
                     } else {
                         tracer.render(self.setup, &frame, &self.stop)
                     }
                 };
-                catch_panic(|| Ok(self.in_pool(trace)?)).map_err(failure)
+                catch_panic(|| Ok(in_pool(trace)?)).map_err(failure)
             });
             if traced.is_err() {
                 if self.stop.is_raised() {
@@ -166,7 +153,8 @@ impl TraceStage<'_> {
     }
 }
 
-/// The third stage: encodes images and publishes their files, several at the same time. Those of a GPU are denoised before.
+/// The third stage: encodes images and publishes their files, several at the same time. Those of a GPU are finished
+/// before.
 pub(super) struct EncodeStage<'a> {
     pub(super) setup: &'a Setup,
     pub(super) context: &'a RunContext<'a, FrameReport>,
@@ -205,9 +193,8 @@ impl EncodeStage<'_> {
             lock_peaks(self.peaks).use_samples_only();
         }
         let write = || {
-            if self.setup.denoises_when_encoding() {
-                self.context.report_stage(number, "denoising");
-                in_pool(|| frame.denoise(self.setup)).map_err(TraceError::from)?;
+            if self.setup.finishes_when_encoding() {
+                in_pool(|| frame.finish(self.setup))?;
             }
             self.context.report_stage(number, "writing");
             Ok(write_frame(self.setup, frame, self.peaks)?)

@@ -1,5 +1,6 @@
 //! Second stage: builds the tree and traces the image.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use spherule_files::memory::MemoryUse;
@@ -72,7 +73,7 @@ impl FrameRenderer for CpuRenderer {
         report.bytes.surface += frame.rods.iter().map(FrameRods::bytes).sum::<u64>();
         Ok(BuiltFrame {
             task: frame.task,
-            particles,
+            particles: Arc::new(particles),
             meshes: frame.meshes,
             rods: frame.rods,
             facts: frame.facts,
@@ -116,6 +117,7 @@ impl FrameRenderer for CpuRenderer {
             camera: setup.camera_at(frame.task.frame)?,
             task: frame.task.clone(),
             film,
+            rest: None,
             texts,
             facts: frame.facts.clone(),
             time: frame.time,
@@ -171,7 +173,7 @@ impl CpuRenderer {
         let scene = setup.scene_at(frame.task.frame, frame.focus)?;
         let surface = &self.surface;
         let others = surface::others(&setup.picture.things.meshes, &frame.meshes, &frame.rods);
-        match &frame.particles {
+        match &*frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.picture, shading);
                 let tree = self.builder.tree().view();

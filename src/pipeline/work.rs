@@ -12,7 +12,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{
     ClaimedFrame, FinishedFrame, FrameFailure, FrameQueue, FrameRecorder, FrameWork, JobError,
@@ -144,18 +143,11 @@ impl RenderWork<'_> {
                 setup: self.setup,
                 context,
                 stop: DropFrame { has_failed: &has_failed, interrupt: context.interrupt() },
-                threads: self.setup.denoises_when_encoding().then(device_threads).flatten(),
             };
             stage.run(loaded, spare, is_built, ToEncoders::new(encoders, idle));
             join_result(written.join())
         })
     }
-}
-
-/// Threads for what the host does for a device, as many as in the common pool; None if the system has no more.
-fn device_threads() -> Option<ThreadPool> {
-    let pool = ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
-    pool.thread_name(|_| "device".to_owned()).build().ok()
 }
 
 fn join_result<T>(result: thread::Result<T>) -> T {

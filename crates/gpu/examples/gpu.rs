@@ -59,6 +59,9 @@ fn compare(renderer: &mut SceneRenderer, size: usize) {
     if size < MANY {
         let difference = support::compare(renderer, &Case::look(size), SimdLevel::best());
         println!("{size}, default look: {difference:?}");
+        let [difference, change] =
+            support::compare_denoised(renderer, &Case::look(size), SimdLevel::best());
+        println!("{size}, default look, denoised: {difference:e}; denoising changes {change:e}");
     }
 }
 
@@ -77,7 +80,8 @@ fn host_times(
         let start = std::time::Instant::now();
         renderer.prepare(&particles.spheres(), None, shading, false).expect("the frame fits");
         let copied = start.elapsed();
-        (renderer.render_into(&mut film, &scene, shading, &settings, &never)).expect("it renders");
+        (renderer.render_into(&mut film, &scene, shading, &settings, case.denoise(), &never))
+            .expect("it renders");
         if number >= PICTURES {
             copy += copied.as_secs_f64();
             render += (start.elapsed() - copied).as_secs_f64();
@@ -91,31 +95,34 @@ fn measure(renderer: &mut SceneRenderer, case: &Case) {
     let particles = Particles::new(case);
     let shading = spherule_tracer::render::ParticleShading::constant(glam::Vec3::splat(0.7));
     let never = std::sync::atomic::AtomicBool::new(false);
-    let [mut build, mut trace, mut wall] = [0.0; 3];
+    let [mut build, mut trace, mut denoise, mut wall] = [0.0; 4];
     let mut bytes = 0;
     renderer.prepare(&particles.spheres(), None, &shading, false).expect("the frame fits");
     for number in 0..WARM_UP + PICTURES {
         let start = std::time::Instant::now();
         let scene = support::scene(case, 0.02 * ((number % PICTURES) as f64 - 15.0));
-        let cost = renderer.measure(&scene, &case.settings(), &never).expect("nothing stops it");
+        let cost = (renderer.measure(&scene, &case.settings(), case.denoise(), &never))
+            .expect("nothing stops it");
         if number >= WARM_UP {
             build += cost.build_seconds;
             trace += cost.trace_seconds;
+            denoise += cost.denoise_seconds;
             wall += start.elapsed().as_secs_f64();
             bytes = cost.bytes;
         }
     }
     let [copy, film] = host_times(renderer, case, &particles, &shading);
-    let [build, trace, wall] = [build, trace, wall].map(|sum| 1e3 * sum / PICTURES as f64);
+    let [build, trace, denoise, wall] =
+        [build, trace, denoise, wall].map(|sum| 1e3 * sum / PICTURES as f64);
     println!(
-        "{} {:?} {:?} {:?} depth {}: build {build:.3} ms, trace {trace:.3} ms, {:.0} images/s on the device, \
+        "{} {:?} {:?} {:?} depth {}: build {build:.3} ms, trace {trace:.3} ms, denoise {denoise:.3} ms, {:.0} images/s on the device, \
          both {wall:.2} ms with the host; copy of the frame {copy:.1} ms, picture to a film {film:.1} ms; {} MiB",
         case.particles,
         case.data,
         case.radii,
         case.paths,
         case.max_depth,
-        1e3 / (build + trace),
+        1e3 / (build + trace + denoise),
         bytes >> 20,
     );
 }

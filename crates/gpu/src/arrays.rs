@@ -1,9 +1,12 @@
 //! Memory of the device: arrays that grow, uniforms, and copies from and to the host.
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
 use bytemuck::Pod;
 use rayon::prelude::*;
 use wgpu::{
-    BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder, MapMode,
+    BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, BufferView,
+    CommandEncoder, MapMode,
 };
 
 use crate::{Device, GpuError};
@@ -154,66 +157,93 @@ impl Array {
     /// # Errors
     /// If the device fails.
     pub(crate) fn read(&self, device: &Device) -> Result<Vec<u8>, GpuError> {
-        let mut download = Download::default();
-        download.reserve(device, self.len)?;
+        let download = Downloads::default().reserve(device, self.len)?;
         let mut encoder = device.raw.create_command_encoder(&Default::default());
         download.copy(&mut encoder, self.buffer(), [0, self.len]);
         device.queue.submit([encoder.finish()]);
-        download.with_content(device, <[u8]>::to_vec)
+        Ok(download.read(device)?.bytes().to_vec())
     }
 }
 
-/// Memory through which the host reads an array.
-#[derive(Debug, Default)]
-pub(crate) struct Download {
-    buffer: Option<Buffer>,
-}
+/// Memory through which the host reads arrays. It is kept for the next.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Downloads(Arc<Mutex<Vec<Buffer>>>);
 
-impl Download {
-    /// Makes room for `len` bytes.
+impl Downloads {
+    /// Memory of `len` bytes.
     ///
     /// # Errors
     /// If memory is full.
-    pub(crate) fn reserve(&mut self, device: &Device, len: u64) -> Result<(), GpuError> {
-        let len = len.max(16);
-        if self.buffer.as_ref().is_none_or(|buffer| buffer.size() != len) {
-            self.buffer = None;
-            self.buffer = Some(device.raw.create_buffer(&BufferDescriptor {
+    pub(crate) fn reserve(&self, device: &Device, len: u64) -> Result<Download, GpuError> {
+        let size = len.max(16);
+        let mut kept = self.lock();
+        kept.retain(|buffer| buffer.size() == size);
+        let buffer = kept.pop();
+        drop(kept);
+        let buffer = buffer.unwrap_or_else(|| {
+            device.raw.create_buffer(&BufferDescriptor {
                 label: Some("download"),
-                size: len,
+                size,
                 usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
                 mapped_at_creation: false,
-            }));
-            device.check().inspect_err(|_| self.buffer = None)?;
-        }
-        Ok(())
+            })
+        });
+        device.check()?;
+        Ok(Download { buffer, kept: self.clone() })
     }
 
+    fn lock(&self) -> MutexGuard<'_, Vec<Buffer>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Memory that arrays are copied to.
+#[derive(Debug)]
+pub(crate) struct Download {
+    buffer: Buffer,
+    kept: Downloads,
+}
+
+impl Download {
     /// Copies the first bytes of `source` to `at` here when `encoder` is submitted. `range` is `[at, length]`.
     pub(crate) fn copy(&self, encoder: &mut CommandEncoder, source: &Buffer, [at, len]: [u64; 2]) {
-        if let Some(buffer) = &self.buffer {
-            encoder.copy_buffer_to_buffer(source, 0, buffer, at, len);
-        }
+        encoder.copy_buffer_to_buffer(source, 0, &self.buffer, at, len);
     }
 
-    /// Waits for the device, and passes the content to `use_content`.
+    /// Waits for the device, and returns the content.
     ///
     /// # Errors
     /// If the device fails.
-    pub(crate) fn with_content<T>(
-        &self,
-        device: &Device,
-        use_content: impl FnOnce(&[u8]) -> T,
-    ) -> Result<T, GpuError> {
-        let buffer = self.buffer.as_ref().expect("reserved before it is read");
+    pub(crate) fn read(self, device: &Device) -> Result<Downloaded, GpuError> {
         // The result of the map is that of the wait
-        buffer.map_async(MapMode::Read, .., |_result| ());
+        self.buffer.map_async(MapMode::Read, .., |_result| ());
         device.wait()?;
-        let range = buffer.get_mapped_range(..).map_err(|error| device.lost(&error))?;
-        let result = use_content(&range);
-        drop(range);
+        let view = self.buffer.get_mapped_range(..).map_err(|error| device.lost(&error))?;
+        Ok(Downloaded { view: Some(view), download: self })
+    }
+}
+
+/// What was copied, in memory of the host.
+#[derive(Debug)]
+pub(crate) struct Downloaded {
+    /// Until this is dropped.
+    view: Option<BufferView>,
+    download: Download,
+}
+
+impl Downloaded {
+    pub(crate) fn bytes(&self) -> &[u8] {
+        self.view.as_deref().unwrap_or_default()
+    }
+}
+
+impl Drop for Downloaded {
+    fn drop(&mut self) {
+        // The view ends before the memory is given back to the device
+        self.view = None;
+        let Download { buffer, kept } = &self.download;
         buffer.unmap();
-        Ok(result)
+        kept.lock().push(buffer.clone());
     }
 }
 

@@ -6,7 +6,7 @@ use wgpu::{
     PipelineCompilationOptions, ShaderModule,
 };
 
-use crate::arrays::{Array, Download};
+use crate::arrays::{Array, Download, Downloads};
 use crate::{Device, GpuError};
 
 /// Workgroups in a row of a dispatch; devices limit each axis to 65,535.
@@ -163,12 +163,11 @@ impl Timer {
     pub(crate) fn seconds(&self, device: &Device, stages: u32) -> Result<Vec<f64>, GpuError> {
         let mut encoder = device.raw.create_command_encoder(&Default::default());
         encoder.resolve_query_set(&self.queries, 0..2 * stages, &self.resolved, 0);
-        let mut download = Download::default();
         let len = 16 * u64::from(stages);
-        download.reserve(device, len)?;
+        let download = Downloads::default().reserve(device, len)?;
         download.copy(&mut encoder, &self.resolved, [0, len]);
         device.queue.submit([encoder.finish()]);
-        let ticks: Vec<u64> = download.with_content(device, bytemuck::pod_collect_to_vec)?;
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(download.read(device)?.bytes());
         let period = f64::from(device.queue.get_timestamp_period()) * 1e-9;
         Ok(ticks.chunks_exact(2).map(|t| t[1].wrapping_sub(t[0]) as f64 * period).collect())
     }

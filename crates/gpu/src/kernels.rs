@@ -20,6 +20,8 @@ pub(crate) struct Kernels {
     pub(crate) trace_shadow: Kernel,
     /// If indirect light has a limit.
     pub(crate) clamp_indirect: Option<Kernel>,
+    /// If the picture is denoised.
+    pub(crate) store_features: Option<Kernel>,
 }
 
 /// What the source of the kernels depends on.
@@ -41,6 +43,8 @@ pub(crate) struct Variant {
     has_objects: bool,
     /// Whether light is kept by parts.
     has_layers: bool,
+    /// Whether the picture is denoised.
+    is_denoised: bool,
     /// Whether spheres are transmissive.
     has_glass: bool,
     /// Whether they are rough then.
@@ -84,6 +88,7 @@ impl Variant {
             has_mirrors,
             has_objects: picture.has_objects,
             has_layers: picture.light_groups.is_some(),
+            is_denoised: picture.denoising.is_some(),
             has_glass,
             is_rough: picture.has_rough_glass(),
             is_common: shape.is_common,
@@ -165,6 +170,7 @@ impl Variant {
             append,
             &glass.concat(),
             &model.concat(),
+            if self.is_denoised { include_str!("shaders/features.wgsl") } else { "" },
         ]
         .concat()
     }
@@ -185,6 +191,7 @@ impl Kernels {
         // Rays that glass ends see the background, which is a part of the light
         let of_glass: &[u32] = if variant.has_glass { &[23] } else { &[] };
         let of_end: &[u32] = if variant.has_glass && !variant.has_paths { &[21] } else { &[] };
+        let of_ground: &[u32] = if variant.has_paths { &[15] } else { &[] };
         let tracing =
             |entry, bindings: &[u32]| kernel(entry, &[bindings, of_spheres, of_motion].concat());
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
@@ -207,6 +214,8 @@ impl Kernels {
             trace_shadow: tracing("trace_shadow", shadow),
             clamp_indirect: (variant.has_clamp)
                 .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18, 21])),
+            store_features: (variant.is_denoised)
+                .then(|| kernel("store_features", &[&[0, 7, 12, 28], of_ground].concat())),
         }
     }
 }

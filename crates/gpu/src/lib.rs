@@ -47,7 +47,7 @@
 //!     exposure: None,
 //!     film,
 //!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128], seed: 0 },
-//!     has_odd: false,
+//!     denoising: None,
 //!     has_objects: false,
 //!     light_groups: None,
 //!     model: Model::Whitted,
@@ -76,11 +76,10 @@
 //!     }],
 //! };
 //! renderer.trace(&device, &picture, &|| false)?;
-//! let indices = renderer.read(&device, |pixels| {
-//!     pixels.nearest.iter().map(|sample| sample.index).collect::<Vec<_>>()
-//! })?;
-//! assert_eq!((indices[4 * 16 + 4], indices[4 * 16 + 12]), (0, 1));
-//! assert_eq!(indices[0], NearestSample::NONE);
+//! let image = renderer.read(&device)?;
+//! let nearest = image.pixels().nearest;
+//! assert_eq!((nearest[4 * 16 + 4].index, nearest[4 * 16 + 12].index), (0, 1));
+//! assert_eq!(nearest[0].index, NearestSample::NONE);
 //! # Ok(())
 //! # }
 //! ```
@@ -89,6 +88,7 @@
 mod arithmetic;
 mod arrays;
 mod commands;
+mod denoise;
 mod device;
 mod error;
 mod kernels;
@@ -105,6 +105,7 @@ mod stored;
 mod tree;
 
 pub use arithmetic::Arithmetic;
+pub use denoise::Denoising;
 pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
 pub use lighting::{
@@ -114,8 +115,8 @@ pub use lighting::{
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-pub use pixels::{Cost, LightLayer, NearestSample, Pixels, SampleObject};
-pub use renderer::{Colors, Renderer, bytes_per_pixel, largest_array};
-pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
+pub use pixels::{Cost, HostPixels, LightLayer, NearestSample, Pixels, SampleObject};
+pub use renderer::{Colors, Renderer, bytes_per_pixel, host_bytes_per_pixel, largest_array};
+pub use scene::{HostImage, Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
 pub use tree::{MAX_SPHERES, TreeNeed};

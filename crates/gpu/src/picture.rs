@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use spherule_tracer::render::PathSeed;
 
+use crate::denoise::Denoising;
 use crate::lighting::{Detail, Lighting, Model, RayKinds};
 
 /// Largest number of lights.
@@ -23,8 +24,8 @@ pub struct Picture<'a> {
     pub film: FilmSize,
     /// Where the samples of pixels are.
     pub samples: Samples<'a>,
-    /// Whether the sums over every second sample are kept, for denoising.
-    pub has_odd: bool,
+    /// How the picture is denoised, if it is; it has at least two samples then.
+    pub denoising: Option<Denoising>,
     /// Whether the first surface of each sample is kept, for Cryptomatte.
     pub has_objects: bool,
     /// Number of light groups with that of light without a group, if light is kept by parts; path tracing only.
@@ -62,7 +63,7 @@ impl<'a> Picture<'a> {
             exposure: None,
             film: FilmSize { width, height, corner: [0, 0] },
             samples: Samples { count: 1, points: &[[0.5, 0.5]], sets, seed: 0 },
-            has_odd: false,
+            denoising: None,
             has_objects: false,
             light_groups: None,
             model: Model::Whitted,
@@ -468,7 +469,7 @@ impl View {
             lens_radius,
             lens_focus,
             sources: picture.sources(),
-            has_odd: picture.has_odd.into(),
+            has_odd: picture.denoising.is_some().into(),
             has_extents: picture.has_extents().into(),
             layer_count: picture.layer_count(),
             sequence,

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::arrays::Downloaded;
 use crate::picture::FIRST_GROUP;
 
 /// The pixels of a picture, row by row.
@@ -9,14 +10,48 @@ use crate::picture::FIRST_GROUP;
 pub struct Pixels<'a> {
     /// Red, green, blue and coverage, each the sum over the samples.
     pub sums: &'a [[f32; 4]],
-    /// The same over every second sample, if the picture has it; else empty.
-    pub odd: &'a [[f32; 4]],
+    /// The denoised means, linear RGB and coverage, if the picture is denoised; else empty.
+    pub clean: &'a [[f32; 4]],
     /// The nearest sample.
     pub nearest: &'a [NearestSample],
     /// The first surface of each sample, pixel by pixel, if the picture has them; else empty.
     pub objects: &'a [SampleObject],
     /// Light by parts, if the picture has it, else empty: plane by plane, see [`LightLayer`], then the light groups.
     pub layers: &'a [[f32; 4]],
+}
+
+/// The pixels of a picture in memory of the host, which its renderer uses again once this is dropped.
+#[derive(Debug)]
+pub struct HostPixels {
+    content: Downloaded,
+    /// Bytes of each slice of [`Pixels`].
+    lengths: [usize; 5],
+}
+
+impl HostPixels {
+    /// `lengths` are those of the slices of [`Pixels`], one behind the other in `content`, bytes.
+    pub(crate) fn new(content: Downloaded, lengths: [u64; 5]) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "they are in memory")]
+        let lengths = lengths.map(|length| length as usize);
+        Self { content, lengths }
+    }
+
+    /// The pixels.
+    pub fn pixels(&self) -> Pixels<'_> {
+        let mut rest = self.content.bytes();
+        let [sums, clean, nearest, objects, layers] = self.lengths.map(|length| {
+            let (slice, others) = rest.split_at(length);
+            rest = others;
+            slice
+        });
+        Pixels {
+            sums: bytemuck::cast_slice(sums),
+            clean: bytemuck::cast_slice(clean),
+            nearest: bytemuck::cast_slice(nearest),
+            objects: bytemuck::cast_slice(objects),
+            layers: bytemuck::cast_slice(layers),
+        }
+    }
 }
 
 /// A plane of [`Pixels::layers`]: sums over the samples, linear RGB.
@@ -107,6 +142,8 @@ pub struct Cost {
     pub build_seconds: f64,
     /// Seconds on the device to trace the picture; 0 if it has no clock.
     pub trace_seconds: f64,
+    /// Seconds on the device to denoise it; 0 if it has no clock.
+    pub denoise_seconds: f64,
     /// Rays from the camera.
     pub primary_rays: u64,
     /// Shadow rays.

@@ -9,12 +9,13 @@ use spherule_tracer::render::{IntegratorKind, RenderSettings};
 use spherule_tracer::scene::Scene;
 use wgpu::BindingResource;
 
-use crate::arrays::{Array, Download, Uniform, Uniforms};
+use crate::arrays::{Array, Downloads, Uniform, Uniforms};
 use crate::commands::{Commands, Timer};
+use crate::denoise::{self, Denoiser};
 use crate::kernels::{Kernels, Variant};
 use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
 use crate::picture::{FIRST_GROUP, FilmSize, Picture, Samples, View, most_kept};
-use crate::pixels::{Cost, Pixels};
+use crate::pixels::{Cost, HostPixels, NearestSample};
 use crate::spheres::Spheres;
 use crate::tree::{TreeBuilder, TreeShape};
 use crate::{Device, GpuError};
@@ -65,8 +66,9 @@ pub struct Renderer {
     kernels: BTreeMap<Variant, Kernels>,
     arrays: TraceArrays,
     uniforms: Uniforms,
+    denoiser: Denoiser,
     timer: Option<Timer>,
-    download: Download,
+    downloads: Downloads,
     has_colors: bool,
     has_opacity: bool,
     color: [f32; 3],
@@ -85,7 +87,7 @@ struct Traced {
     samples: u32,
     sources: u32,
     queues: u32,
-    has_odd: bool,
+    is_denoised: bool,
     has_objects: bool,
     layers: u32,
 }
@@ -161,10 +163,13 @@ impl TraceArrays {
     }
 }
 
-/// Memory of the film for each pixel, bytes. `has_odd`: the sums over every second sample are kept.
-const fn film_bytes(has_odd: bool, has_clamp: bool) -> u64 {
-    16 * (1 + has_odd as u64 + has_clamp as u64)
+/// Memory of the film for each pixel, bytes. `is_denoised`: it has the sums over every second sample.
+const fn film_bytes(is_denoised: bool, has_clamp: bool) -> u64 {
+    16 * (1 + is_denoised as u64 + has_clamp as u64)
 }
+
+/// Memory of the nearest sample of a pixel, bytes.
+const DATA_BYTES: u64 = size_of::<NearestSample>() as u64;
 
 /// Memory of the first surfaces of the samples of a pixel, bytes.
 const fn object_bytes(has_objects: bool, samples: u32) -> u64 {
@@ -205,7 +210,8 @@ pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
     let (rays, [objects, layers]) = needs_of(scene, settings);
     let shadows = rays.shadow_bytes() * u64::from(rays.sources());
     let pixels = u64::from(settings.width) * u64::from(settings.height);
-    let arrays = [shadows, rays.ray_bytes(), rays.kept_bytes(), objects, layers];
+    let denoiser = if settings.has_features { denoise::LARGEST_PER_PIXEL } else { 0 };
+    let arrays = [shadows, rays.ray_bytes(), rays.kept_bytes(), objects, layers, denoiser];
     arrays.into_iter().max().unwrap_or_default() * pixels
 }
 
@@ -213,8 +219,24 @@ pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
 pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
     let (rays, [objects, layers]) = needs_of(scene, settings);
     let film = film_bytes(settings.has_features, rays.has_paths && settings.clamp.is_some());
+    let denoiser = if settings.has_features { denoise::BYTES_PER_PIXEL } else { 0 };
     let shadows = rays.shadow_bytes() * u64::from(rays.sources());
-    4 + film + 32 + objects + layers + 2 * rays.ray_bytes() + shadows + rays.kept_bytes()
+    4 + film
+        + denoiser
+        + DATA_BYTES
+        + objects
+        + layers
+        + 2 * rays.ray_bytes()
+        + shadows
+        + rays.kept_bytes()
+}
+
+/// Memory of the host for each pixel that was traced and is not stored yet, bytes.
+pub fn host_bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
+    let (_, [objects, _]) = needs_of(scene, settings);
+    let layers = light_groups_of(settings).map_or(0, |groups| FIRST_GROUP + groups);
+    let films = 1 + u64::from(settings.has_features);
+    films * film_bytes(false, false) + DATA_BYTES + objects + layer_bytes(layers, false)
 }
 
 impl Renderer {
@@ -225,8 +247,9 @@ impl Renderer {
             kernels: BTreeMap::new(),
             arrays: TraceArrays::default(),
             uniforms: Uniforms::default(),
+            denoiser: Denoiser::default(),
             timer: Timer::new(device, MAX_STAGES),
-            download: Download::default(),
+            downloads: Downloads::default(),
             has_colors: false,
             has_opacity: false,
             color: [0.0; 3],
@@ -317,19 +340,38 @@ impl Renderer {
             self.submit_stage(device, commands)?;
             self.trace_kept(device, &plan, variant, samples, is_stopped)?;
         }
-        let mut commands = Commands::new(device);
-        self.add_count(&mut commands, &self.kernels[&variant], &plan);
-        commands.submit();
+        self.denoise(device, &plan, variant, picture)?;
         self.traced = Some(Traced {
             pixels: picture.film.pixels(),
             samples: picture.samples.count,
             sources: picture.sources(),
             queues: picture.ray_kinds().queues(),
-            has_odd: picture.has_odd,
+            is_denoised: picture.denoising.is_some(),
             has_objects: picture.has_objects,
             layers: picture.layer_count(),
         });
         device.check()
+    }
+
+    /// Counts the rays of the last sample, and denoises the picture if it is to be: the last stage.
+    fn denoise(
+        &mut self,
+        device: &Device,
+        plan: &Plan,
+        variant: Variant,
+        picture: &Picture<'_>,
+    ) -> Result<(), GpuError> {
+        let mut commands = Commands::new(device);
+        let kernels = &self.kernels[&variant];
+        self.add_count(&mut commands, kernels, plan);
+        let (Some(denoising), Some(store)) = (&picture.denoising, &kernels.store_features) else {
+            commands.submit();
+            return Ok(());
+        };
+        let array_of = |binding| self.array(binding, plan, [plan.samples[0], plan.depths[0]], 0);
+        commands.add(store, &array_of, plan.film.pixels(), GROUP);
+        self.denoiser.add(device, &mut commands, picture, denoising, &self.arrays.film)?;
+        self.submit_stage(device, commands)
     }
 
     /// Starts the dispatches of a stage, whose time is measured. If that of no more stages can be kept, adds up those so far.
@@ -375,47 +417,34 @@ impl Renderer {
         }
     }
 
-    /// Waits for the picture that was started last, and passes its pixels to `store`.
+    /// Waits for the picture that was started last, and returns its pixels.
     ///
     /// # Errors
     /// If the device fails.
     ///
     /// # Panics
     /// Without a picture.
-    pub fn read<T>(
-        &mut self,
-        device: &Device,
-        store: impl FnOnce(&Pixels<'_>) -> T,
-    ) -> Result<T, GpuError> {
-        let Traced { pixels, samples, has_odd, has_objects, layers, .. } =
+    pub fn read(&self, device: &Device) -> Result<HostPixels, GpuError> {
+        let Traced { pixels, samples, is_denoised, has_objects, layers, .. } =
             self.traced.expect("a picture was traced");
-        let film = film_bytes(has_odd, false) * pixels;
-        let objects = object_bytes(has_objects, samples) * pixels;
-        let layers = layer_bytes(layers, false) * pixels;
-        let others = film + 32 * pixels;
-        self.download.reserve(device, others + objects + layers)?;
+        let film = film_bytes(false, false) * pixels;
+        let parts = [
+            (&self.arrays.film, film),
+            (self.denoiser.clean(), if is_denoised { film } else { 0 }),
+            (&self.arrays.data, DATA_BYTES * pixels),
+            (&self.arrays.objects, object_bytes(has_objects, samples) * pixels),
+            (&self.arrays.layers, layer_bytes(layers, false) * pixels),
+        ];
+        let lengths = parts.map(|(_, length)| length);
+        let download = self.downloads.reserve(device, lengths.iter().sum())?;
         let mut commands = Commands::new(device);
-        commands.copy(&self.arrays.film, &self.download, [0, film]);
-        commands.copy(&self.arrays.data, &self.download, [film, 32 * pixels]);
-        commands.copy(&self.arrays.objects, &self.download, [others, objects]);
-        commands.copy(&self.arrays.layers, &self.download, [others + objects, layers]);
+        let mut at = 0;
+        for (array, length) in parts.into_iter().filter(|(_, length)| *length > 0) {
+            commands.copy(array, &download, [at, length]);
+            at += length;
+        }
         commands.submit();
-        self.download.with_content(device, |bytes| {
-            #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
-            let [film, pixels, objects, layers] =
-                [film, pixels, objects, layers].map(|length| length as usize);
-            let (film, others) = bytes.split_at(film);
-            let (sums, odd) = film.split_at(16 * pixels);
-            let (nearest, others) = others.split_at(32 * pixels);
-            let (objects, others) = others.split_at(objects);
-            store(&Pixels {
-                sums: bytemuck::cast_slice(sums),
-                odd: bytemuck::cast_slice(odd),
-                nearest: bytemuck::cast_slice(nearest),
-                objects: bytemuck::cast_slice(objects),
-                layers: bytemuck::cast_slice(&others[..layers]),
-            })
-        })
+        Ok(HostPixels::new(download.read(device)?, lengths))
     }
 
     /// Waits for the picture that was started last. Returns what it and its frame have cost.
@@ -426,7 +455,7 @@ impl Renderer {
     /// # Panics
     /// Without a picture.
     pub fn cost(&self, device: &Device) -> Result<Cost, GpuError> {
-        let Traced { pixels, samples, sources, queues, .. } =
+        let Traced { pixels, samples, sources, queues, is_denoised, .. } =
             self.traced.expect("a picture was traced");
         let counts: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
         let (lengths, lost) = counts.split_at(counts.len() - LOST_WORDS);
@@ -439,16 +468,19 @@ impl Renderer {
             Some(timer) => timer.seconds(device, self.stages)?,
             None => Vec::new(),
         };
+        // The last stage denoises
+        let tracing = seconds.len() - usize::from(is_denoised && !seconds.is_empty());
         let arrays = self.arrays.all().iter().map(|array| array.bytes()).sum::<u64>();
         Ok(Cost {
             build_seconds: seconds.first().copied().unwrap_or_default(),
-            trace_seconds: self.seconds_before + seconds.iter().skip(1).sum::<f64>(),
+            trace_seconds: self.seconds_before + seconds[..tracing].iter().skip(1).sum::<f64>(),
+            denoise_seconds: seconds[tracing..].iter().sum(),
             primary_rays: pixels * u64::from(samples),
             reflected_rays: of_queue(0) - refracted,
             refracted_rays: refracted,
             shadow_rays: (1..=sources).map(of_queue).sum(),
             lost_steps: lost[0].saturating_add(lost[1].saturating_mul(1 << 32)),
-            bytes: self.tree.bytes() + arrays,
+            bytes: self.tree.bytes() + arrays + self.denoiser.bytes(),
             tree_bytes: self.tree.bytes(),
         })
     }
@@ -456,11 +488,14 @@ impl Renderer {
     fn reserve(&mut self, device: &Device, picture: &Picture<'_>) -> Result<(), GpuError> {
         let pixels = picture.film.pixels();
         let rays = picture.ray_kinds();
-        let film = film_bytes(picture.has_odd, picture.has_clamp());
+        let film = film_bytes(picture.denoising.is_some(), picture.has_clamp());
+        if picture.denoising.is_some() {
+            self.denoiser.reserve(device, picture)?;
+        }
         let counters = vec![0; counter_count(picture) as usize];
         let arrays = &mut self.arrays;
         arrays.film.reserve(device, "pixels", film * pixels)?;
-        arrays.data.reserve(device, "pixels", 32 * pixels)?;
+        arrays.data.reserve(device, "pixels", DATA_BYTES * pixels)?;
         let objects = object_bytes(picture.has_objects, picture.samples.count);
         arrays.objects.reserve(device, "objects of all samples", objects * pixels)?;
         let layers = layer_bytes(picture.layer_count(), picture.has_clamp());
@@ -622,6 +657,7 @@ impl Renderer {
             20 => &arrays.objects,
             21 => &arrays.layers,
             23 => &arrays.kept,
+            28 => self.denoiser.guides(),
             _ => {
                 return self
                     .tree

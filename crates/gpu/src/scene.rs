@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
+use spherule_tracer::denoise::{DenoiseError, DenoiseSettings};
 use spherule_tracer::render::device::{
     DeviceHit, DeviceLight, DeviceObject, DevicePixel, DevicePixels, Extent, extent_of,
     mirrors_see_through, needs_light_parts, needs_photons, store_pixels,
 };
 use spherule_tracer::render::{
-    Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts,
+    Drawing, Film, FilmSampler, IntegratorKind, LostLight, ParticleShading, RayCounts, RenderError,
     RenderSettings, ShadeSource, Stop,
 };
 use spherule_tracer::scene::ground::Pattern;
@@ -21,11 +22,12 @@ use spherule_tracer::scene::{
 use spherule_tree::accel;
 use spherule_tree::blocks::StoredLeaves;
 
+use crate::denoise::Denoising;
 use crate::lighting::Model;
 use crate::picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-use crate::pixels::{Cost, LightLayer, NearestSample, Pixels};
+use crate::pixels::{Cost, HostPixels, LightLayer, NearestSample, Pixels};
 use crate::renderer::{Colors, Renderer, light_groups_of};
 use crate::scene_lighting::SceneLighting;
 use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
@@ -269,7 +271,8 @@ impl SceneRenderer {
         self.renderer.prepare(&self.device, spheres, colors)
     }
 
-    /// Renders the spheres that were prepared last, into `film`. Nothing may be [`missing`].
+    /// Renders the spheres that were prepared last, into `film`, and denoises the picture if `denoise` is there. Nothing
+    /// may be [`missing`].
     ///
     /// # Errors
     /// If `stop` is raised, if a setting is out of range, or if the device fails.
@@ -282,16 +285,34 @@ impl SceneRenderer {
         scene: &Scene,
         source: &dyn ShadeSource,
         settings: &RenderSettings,
+        denoise: Option<DenoiseSettings>,
         stop: &dyn Stop,
     ) -> Result<Cost, SceneError> {
-        self.trace(scene, source, settings, stop)?;
-        let store = |pixels: &Pixels<'_>| {
-            let pixels = SummedPixels { pixels: *pixels, samples: settings.samples };
-            store_pixels(film, scene, source, settings, &pixels)
-        };
-        self.renderer.read(&self.device, store)??;
+        let (image, cost) = self.render(scene, source, settings, denoise, stop)?;
+        image.store(film, scene, source, settings)?;
+        Ok(cost)
+    }
+
+    /// The same, without a film: the host can store the image while the device renders the next one.
+    ///
+    /// # Errors
+    /// Same as [`Self::render_into`].
+    ///
+    /// # Panics
+    /// Same as [`Self::render_into`].
+    pub fn render(
+        &mut self,
+        scene: &Scene,
+        source: &dyn ShadeSource,
+        settings: &RenderSettings,
+        denoise: Option<DenoiseSettings>,
+        stop: &dyn Stop,
+    ) -> Result<(HostImage, Cost), SceneError> {
+        self.trace(scene, source, settings, denoise, stop)?;
+        let pixels = self.renderer.read(&self.device)?;
         stop.pixels_done(settings.width * settings.height);
-        Ok(self.renderer.cost(&self.device)?)
+        let image = HostImage { pixels, samples: settings.samples };
+        Ok((image, self.renderer.cost(&self.device)?))
     }
 
     /// Builds the tree of the spheres that were prepared last once more, renders them, and leaves the picture on the
@@ -303,11 +324,12 @@ impl SceneRenderer {
         &mut self,
         scene: &Scene,
         settings: &RenderSettings,
+        denoise: Option<DenoiseSettings>,
         stop: &dyn Stop,
     ) -> Result<Cost, SceneError> {
         self.renderer.rebuild(&self.device)?;
         let source = ParticleShading::constant(Vec3::ONE);
-        self.trace(scene, &source, settings, stop)?;
+        self.trace(scene, &source, settings, denoise, stop)?;
         Ok(self.renderer.cost(&self.device)?)
     }
 
@@ -316,9 +338,13 @@ impl SceneRenderer {
         scene: &Scene,
         source: &dyn ShadeSource,
         settings: &RenderSettings,
+        denoise: Option<DenoiseSettings>,
         stop: &dyn Stop,
     ) -> Result<(), SceneError> {
         settings.validate()?;
+        if let Some(denoise) = denoise {
+            denoise.validate(settings.samples)?;
+        }
         let size = film_size(settings);
         self.samples.fit(size, settings);
         let lights: Vec<_> = scene.lights.iter().map(light_of).collect();
@@ -336,7 +362,10 @@ impl SceneRenderer {
             max_depth: settings.max_depth,
             background: background_of(&scene.background),
             is_transparent: settings.transparent_background,
-            has_odd: settings.has_features,
+            denoising: denoise.map(|settings| Denoising {
+                settings,
+                is_bounded: scene.ground.as_ref().is_some_and(|of| of.shadow_catcher.is_some()),
+            }),
             has_objects: settings.channels.mattes().next().is_some(),
             light_groups: light_groups_of(settings),
             model: match settings.integrator {
@@ -351,6 +380,30 @@ impl SceneRenderer {
     }
 }
 
+/// An image that a device has rendered, in memory of the host.
+#[derive(Debug)]
+pub struct HostImage {
+    pixels: HostPixels,
+    samples: u32,
+}
+
+impl HostImage {
+    /// Stores the image in `film`. The rest are the arguments that it was rendered with.
+    ///
+    /// # Errors
+    /// If a setting is out of range.
+    pub fn store(
+        &self,
+        film: &mut Film,
+        scene: &Scene,
+        source: &dyn ShadeSource,
+        settings: &RenderSettings,
+    ) -> Result<(), RenderError> {
+        let pixels = SummedPixels { pixels: self.pixels.pixels(), samples: self.samples };
+        store_pixels(film, scene, source, settings, &pixels)
+    }
+}
+
 /// Pixels with their number of samples.
 struct SummedPixels<'a> {
     pixels: Pixels<'a>,
@@ -359,12 +412,11 @@ struct SummedPixels<'a> {
 
 impl DevicePixels for SummedPixels<'_> {
     fn pixel(&self, number: usize) -> DevicePixel {
-        let Pixels { sums, odd, nearest, .. } = self.pixels;
+        let Pixels { sums, clean, nearest, .. } = self.pixels;
         let share = 1.0 / self.samples as f32;
-        let odd_share = 1.0 / (self.samples / 2).max(1) as f32;
         DevicePixel {
             color: sums[number].map(|sum| sum * share),
-            odd: odd.get(number).copied().unwrap_or_default().map(|sum| sum * odd_share),
+            clean: clean.get(number).copied(),
             nearest: hit_of(&nearest[number]),
         }
     }
@@ -547,7 +599,10 @@ fn key_length(centers: &[Vec3]) -> KeyLength {
 pub enum SceneError {
     /// A setting is out of range.
     #[error(transparent)]
-    Render(#[from] spherule_tracer::render::RenderError),
+    Render(#[from] RenderError),
+    /// The picture cannot be denoised.
+    #[error(transparent)]
+    Denoise(#[from] DenoiseError),
     /// The device failed, or rendering was stopped.
     #[error(transparent)]
     Device(#[from] GpuError),

@@ -35,7 +35,7 @@ pub(super) fn build_and_trace(request: &CellRequest) -> Result<Measured, CellErr
     // Each image builds the tree once more
     let still = request.stage.scene(request.motion, 0.0, aspect(request))?;
     let builds = Builds::repeat(request.budget, || {
-        let cost = renderer.measure(&still, &settings, &never).map_err(failed)?;
+        let cost = renderer.measure(&still, &settings, None, &never).map_err(failed)?;
         Ok(BuildReport {
             structure: request.structure,
             order: "hilbert",
@@ -55,7 +55,7 @@ pub(super) fn build_and_trace(request: &CellRequest) -> Result<Measured, CellErr
         })
     })?;
     let images = Images::repeat(request, |scene| {
-        let cost = renderer.measure(scene, &settings, &never).map_err(failed)?;
+        let cost = renderer.measure(scene, &settings, None, &never).map_err(failed)?;
         peaks.sample();
         Ok((cost.trace_seconds, ray_counts(&cost)))
     })?;
@@ -75,6 +75,6 @@ fn first_gpu() -> Result<Device, CellError> {
 fn failed(error: SceneError) -> CellError {
     match error {
         SceneError::Render(error) => CellError::Render(error),
-        SceneError::Device(error) => CellError::Gpu(error.to_string()),
+        SceneError::Denoise(_) | SceneError::Device(_) => CellError::Gpu(error.to_string()),
     }
 }

@@ -1,9 +1,9 @@
 //! Adds up what the stages hold at the same time.
 
-use super::super::mattes;
+use super::super::{gpu, mattes};
 use super::{FrameSize, MemoryModel, MemoryNeed, Neighbours};
 use crate::denoise;
-use crate::render::{GroundLightBytes, ground_light_bytes, sampler_bytes};
+use crate::render::{GroundLightBytes, RendererKind, ground_light_bytes, sampler_bytes};
 use crate::scene::Ground;
 use crate::scene::ground::Pattern;
 use crate::surface::SurfaceKind;
@@ -88,8 +88,7 @@ impl MemoryModel<'_> {
         // Count the threads, including those for reading
         let threads = rayon::current_num_threads() as u64;
         let has_read_pool = [Some(frame), after].into_iter().flatten().any(FrameSize::needs_many);
-        let has_device_pool = self.setup.denoises_when_encoding();
-        let pools = 1 + u64::from(has_read_pool) + u64::from(has_device_pool);
+        let pools = 1 + u64::from(has_read_pool);
         MemoryNeed {
             program: PROGRAM + environment + picture + THREAD * threads * pools,
             reading: shared(frame).max(self.retained(frame)),
@@ -108,7 +107,7 @@ impl MemoryModel<'_> {
             // The kept data are in the memory that the allocator retains.
             reading: shared(frame).max(self.retained(frame).saturating_sub(kept)),
             images: self.film() * place.before.min(place.neighbours.encoders + 1)
-                + self.denoised_beside(encoded),
+                + self.unfinished(frame, encoded),
             encoding: encoded * self.encoding(),
             ..place.idle
         };
@@ -139,7 +138,7 @@ impl MemoryModel<'_> {
             surface: self.surface(frame).kept + self.meshes_beside(frame),
             images: self.film() * (1 + encoded)
                 + self.tracing_scratch() * threads
-                + self.denoised_beside(encoded),
+                + self.unfinished(frame, 1 + encoded),
             encoding: encoded * self.encoding() + self.names(frame),
         }
     }
@@ -174,9 +173,17 @@ impl MemoryModel<'_> {
         ground_light_bytes(&self.setup.picture.scene, &self.setup.picture.render)
     }
 
-    /// Memory of so many images that are denoised while others are traced.
-    fn denoised_beside(&self, images: u64) -> u64 {
-        if self.setup.denoises_when_encoding() { images * self.filtering() } else { 0 }
+    /// Memory of so many images like that of `frame` that were rendered on a device, until they are in a film: their
+    /// pixels, and what the particles show.
+    fn unfinished(&self, frame: &FrameSize, images: u64) -> u64 {
+        let render = &self.setup.picture.render;
+        let pixels = u64::from(render.width) * u64::from(render.height);
+        match self.setup.picture.renderer {
+            RendererKind::Cpu => 0,
+            RendererKind::Gpu => {
+                images * (pixels * gpu::host_bytes(self.setup) + self.shading(frame))
+            }
+        }
     }
 
     /// Memory for denoising an image.
@@ -190,9 +197,10 @@ impl MemoryModel<'_> {
     }
 
     /// After `tracing`: the frames before and after are usually done, except with several encoders, which are there
-    /// because encoding takes longer. Images that are denoised while others are traced need the most then, or alone.
+    /// because encoding takes longer. A device denoises in its own memory.
     fn denoising(&self, place: &Place<'_>, tracing: MemoryNeed) -> MemoryNeed {
-        if self.setup.picture.denoise.is_none() {
+        let is_on_device = self.setup.picture.renderer == RendererKind::Gpu;
+        if self.setup.picture.denoise.is_none() || is_on_device {
             return MemoryNeed::default();
         }
         // Count the images that exist at this time

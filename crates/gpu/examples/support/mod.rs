@@ -10,6 +10,7 @@ use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
 use spherule_surface::Shape;
 use spherule_surface::moving::MovingSpheres;
 use spherule_surface::spheres::SphereSurface;
+use spherule_tracer::denoise::{DenoiseInput, DenoiseSettings, denoise};
 use spherule_tracer::render::{
     Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, Opacities,
     ParticleShading, RayCounts, RenderSettings, Stop, StyleShading, render,
@@ -210,6 +211,11 @@ impl Case {
     /// A picture of the default look, with 16 samples.
     pub(crate) const fn look(particles: usize) -> Self {
         Self { samples: 16, paths: Some(Paths::Look), ..Self::thesis(particles) }
+    }
+
+    /// How the picture is denoised, if it is.
+    pub(crate) fn denoise(&self) -> Option<DenoiseSettings> {
+        (self.paths.is_some() && self.samples >= 2).then_some(DenoiseSettings::OPAQUE)
     }
 
     /// The settings of the picture.
@@ -507,8 +513,6 @@ pub(crate) struct Difference {
     /// The mean of the differences of colours, relative to the mean colour; and that of their sums over all pixels.
     pub(crate) mean: f64,
     pub(crate) bias: f64,
-    /// The same for the colours of every second sample.
-    pub(crate) odd: f64,
     /// Whether as many rays were traced.
     pub(crate) rays: bool,
     /// Rays to other surfaces and to lights, relative to those of the CPU.
@@ -560,7 +564,7 @@ pub(crate) fn prepare(renderer: &mut SceneRenderer, case: &Case) -> Result<(), G
 /// The film of the device.
 pub(crate) fn film(renderer: &mut SceneRenderer, case: &Case) -> (Film, Cost) {
     let (particles, map) = (Particles::new(case), color_map());
-    film_of(renderer, case, &particles, &shading(case, &particles, &map), 0.0)
+    film_of(renderer, case, &particles, &shading(case, &particles, &map), None)
 }
 
 pub(crate) fn film_of(
@@ -568,7 +572,7 @@ pub(crate) fn film_of(
     case: &Case,
     particles: &Particles,
     shading: &ParticleShading<'_>,
-    angle: f64,
+    denoise: Option<DenoiseSettings>,
 ) -> (Film, Cost) {
     let displacements = particles.displacements.as_deref();
     (renderer.prepare(&particles.spheres(), displacements, shading, case.glass.is_some()))
@@ -576,7 +580,7 @@ pub(crate) fn film_of(
     let mut film = Film::default();
     let never = AtomicBool::new(false);
     let cost = renderer
-        .render_into(&mut film, &scene(case, angle), shading, &case.settings(), &never)
+        .render_into(&mut film, &scene(case, 0.0), shading, &case.settings(), denoise, &never)
         .expect("nothing stops the picture");
     (film, cost)
 }
@@ -592,7 +596,46 @@ pub(crate) fn stopped(
     let displacements = particles.displacements.as_deref();
     renderer.prepare(&particles.spheres(), displacements, &shading, case.glass.is_some())?;
     let mut film = Film::default();
-    renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), stop)
+    renderer.render_into(&mut film, &scene(case, 0.0), &shading, &case.settings(), None, stop)
+}
+
+/// Renders and denoises `case` on both: the mean of the differences, relative to the mean colour; and how much denoising
+/// changes.
+pub(crate) fn compare_denoised(
+    renderer: &mut SceneRenderer,
+    case: &Case,
+    level: SimdLevel,
+) -> [f64; 2] {
+    let (particles, map) = (Particles::new(case), color_map());
+    let shading = shading(case, &particles, &map);
+    let (found, _) = film_of(renderer, case, &particles, &shading, case.denoise());
+    let (noisy, _) = film_of_cpu(case, &particles, &shading, level);
+    let expected = denoised(case, &noisy);
+    let values = |pixels: &[[f32; 4]]| pixels.as_flattened().iter().map(|v| f64::from(*v)).sum();
+    let total: f64 = values(&expected);
+    let difference = |of: &[[f32; 4]]| {
+        let pairs = of.as_flattened().iter().zip(expected.as_flattened());
+        pairs.map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / total
+    };
+    [difference(&found.color), difference(&noisy.color)]
+}
+
+/// The picture of `film`, denoised on the CPU.
+fn denoised(case: &Case, film: &Film) -> Vec<[f32; 4]> {
+    let input = DenoiseInput {
+        width: film.width,
+        height: film.height,
+        views: [1, 1],
+        samples: case.samples,
+        is_transparent: case.settings().transparent_background,
+        color: &film.color,
+        odd: film.odd.as_deref().expect("it has features"),
+        albedo: film.plane(FilmPlane::Albedo).expect("it has features"),
+        normal: film.plane(FilmPlane::Normal).expect("it has features"),
+        depth: film.plane(FilmPlane::Depth).expect("it has features"),
+    };
+    let settings = case.denoise().expect("it has two samples");
+    denoise(&input, &settings).expect("the planes have the size of the film")
 }
 
 /// The film of the CPU, traced with the kernels of `level`.
@@ -622,7 +665,7 @@ pub(crate) fn film_of_cpu(
 pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLevel) -> Difference {
     let (particles, map) = (Particles::new(case), color_map());
     let shading = shading(case, &particles, &map);
-    let (found, cost) = film_of(renderer, case, &particles, &shading, 0.0);
+    let (found, cost) = film_of(renderer, case, &particles, &shading, None);
     let (expected, rays) = film_of_cpu(case, &particles, &shading, level);
     let differing = |plane, components: usize| {
         let [a, b] = [&found, &expected].map(|film| film.plane::<u32>(plane).expect("all exist"));
@@ -650,13 +693,10 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
         let size = b.iter().map(|b| f64::from(*b)).sum::<f64>();
         [differences / total, size / total]
     });
-    let odd_means = |film: &Film| film.odd.clone().unwrap_or_default();
-    let odd = odd_means(&found).into_iter().zip(odd_means(&expected));
     let secondary = |rays: RayCounts| (rays.shadow + rays.reflection + rays.refraction) as f64;
     Difference {
         mean: sum(&distance) / total,
         bias: (sum(&|a, _| rgb(a)) / total - 1.0).abs(),
-        odd: odd.map(|(a, b)| distance(&a, &b)).sum::<f64>() / total,
         lost: [(&found, ray_counts(&cost)), (&expected, rays)]
             .map(|(film, rays)| rays.lost.part(&film.color, case.samples)),
         ray_ratio: secondary(ray_counts(&cost)) / secondary(rays).max(1.0),

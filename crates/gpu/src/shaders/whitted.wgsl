@@ -13,6 +13,9 @@ fn seen_at_end(direction: vec3<f32>) -> vec3<f32> { return background(direction)
 
 fn group_at_end() -> u32 { return 0u; }
 
+// There is no ground
+fn ground_color(point: vec3<f32>) -> vec3<f32> { return vec3<f32>(0.0); }
+
 // The direction to the light from `start`, and the distance.
 fn toward(source: Light, start: vec3<f32>) -> vec4<f32> {
   if (source.kind == DISTANT) { return vec4<f32>(source.place, FAR); }

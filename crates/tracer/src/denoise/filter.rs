@@ -85,7 +85,7 @@ impl<'a> TileFilter<'a> {
             input,
             limits,
             search: search as isize,
-            color_scale: 1.0 / (settings.k * settings.k * (PATCH_SIDE * PATCH_SIDE) as f32),
+            color_scale: settings.color_scale(),
             layout,
             tile: Tile::new(layout, rows),
             sums: [sums(), sums()],

@@ -39,6 +39,7 @@ use thiserror::Error;
 
 use spherule_tree::math::{SimdLevel, Supported};
 
+pub mod device;
 mod filter;
 mod gather;
 mod glints;
@@ -134,9 +135,6 @@ pub enum DenoiseError {
 
 impl DenoiseInput<'_> {
     fn validate(&self) -> Result<(), DenoiseError> {
-        if self.samples < 2 {
-            return Err(DenoiseError::OneSample);
-        }
         let (width, height) = (self.width, self.height);
         let wanted = u64::from(width) * u64::from(height);
         for (plane, len) in [
@@ -202,7 +200,7 @@ fn denoise_with(
     settings: &DenoiseSettings,
     execution: &Execution,
 ) -> Result<Vec<[f32; 4]>, DenoiseError> {
-    settings.validate()?;
+    settings.validate(input.samples)?;
     input.validate()?;
     let mut filtered = vec![[0.0; 4]; input.color.len()];
     if filtered.is_empty() {

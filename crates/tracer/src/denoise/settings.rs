@@ -44,8 +44,14 @@ impl DenoiseSettings {
     /// would blur it.
     pub const WATER: Self = Self { search: 4, k: 0.35 };
 
-    /// Checks that all values are in their ranges.
-    pub(super) fn validate(&self) -> Result<(), DenoiseError> {
+    /// Checks that all values are in their ranges, and that pictures of so many `samples` per pixel can be filtered.
+    ///
+    /// # Errors
+    /// The first thing that is not so.
+    pub fn validate(&self, samples: u32) -> Result<(), DenoiseError> {
+        if samples < 2 {
+            return Err(DenoiseError::OneSample);
+        }
         let (search, k) = (self.search, self.k);
         if !SEARCH_RADII.contains(&search) {
             return Err(DenoiseError::SearchRadius { search });

@@ -36,8 +36,8 @@ const ROWS: u32 = 16;
 pub struct DevicePixel {
     /// Linear RGB and coverage, each the mean of the samples.
     pub color: [f32; 4],
-    /// The same of every second sample. For denoising.
-    pub odd: [f32; 4],
+    /// The same after denoising, if the device has denoised the picture.
+    pub clean: Option<[f32; 4]>,
     /// The nearest intersection, if any sample has one.
     pub nearest: Option<DeviceHit>,
 }
@@ -120,8 +120,10 @@ pub fn store_pixels(
     pixels: &impl DevicePixels,
 ) -> Result<(), RenderError> {
     settings.validate()?;
-    let RenderSettings { width, height, channels, has_features, .. } = *settings;
-    film.fit(width, height, channels, has_features);
+    let RenderSettings { width, height, channels, .. } = *settings;
+    // The features that a denoiser needs have stayed on the device
+    let settings = &RenderSettings { has_features: false, ..*settings };
+    film.fit(width, height, channels, settings.has_features);
     let context = RenderContext::new(Vec::new(), scene, source, settings);
     film.bands_mut(ROWS).into_par_iter().for_each(|mut band| {
         let mut objects = PixelObjects::default();
@@ -199,10 +201,14 @@ impl RenderContext<'_> {
         (pixels, number): (&impl DevicePixels, usize),
     ) {
         // As on the CPU, what the bounds of the colour change is light of the background
-        let color = Vec3::from_slice(&bounded(pixel.color, self.catches_shadows()));
+        let means = bounded(pixel.color, self.catches_shadows());
+        let color = Vec3::from_slice(&means);
         let limited = color - Vec3::from_slice(&pixel.color);
         let light = pixels.light(number);
         let direct = light.direct + limited;
+        // What coverage gains by denoising is shadow
+        let arriving = (Vec3::ONE - light.loss).max(Vec3::ZERO);
+        let change = pixel.clean.map_or(0.0, |clean| means[3] - clean[3]);
         for (plane, value) in [
             (FilmPlane::Diffuse, light.diffuse),
             (FilmPlane::Specular, light.specular),
@@ -212,7 +218,7 @@ impl RenderContext<'_> {
             (FilmPlane::Background, light.background + limited),
             (FilmPlane::Direct, direct),
             (FilmPlane::Indirect, color - direct),
-            (FilmPlane::ShadowCatcher, (Vec3::ONE - light.loss).max(Vec3::ZERO)),
+            (FilmPlane::ShadowCatcher, (arriving + change).max(Vec3::ZERO)),
         ] {
             store(tile.components_mut(plane, column, row), value);
         }
@@ -227,11 +233,9 @@ impl RenderContext<'_> {
 
     fn store_pixel(&self, tile: &mut FilmTile<'_>, [column, row]: [u32; 2], pixel: &DevicePixel) {
         // A shadow catcher takes light away, sample by sample
-        let is_bounded = self.catches_shadows();
-        let color = bounded(pixel.color, is_bounded);
-        tile.set_color(column, row, color);
+        let color = bounded(pixel.color, self.catches_shadows());
+        tile.set_color(column, row, pixel.clean.unwrap_or(color));
         store(tile.components_mut(FilmPlane::Noisy, column, row), Vec3::from_slice(&color));
-        tile.set_odd(column, row, bounded(pixel.odd, is_bounded));
         let data = pixel.nearest.map_or(DataSample::MISS, |hit| self.data_of(&hit));
         tile.set_data(column, row, &data);
         if self.settings.channels.has(FilmPlane::Attributes) {
