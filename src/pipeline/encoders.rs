@@ -1,4 +1,4 @@
-//! Decides how many images are worth encoding at the same time.
+//! Decides what stages do at the same time, and how many images are worth encoding at once.
 //!
 //! The preview is encoded by one thread, and so is everything around it: files are synced, the ledger is written. On
 //! many cores, small images with few samples take longer there than they take to trace. The decision follows from the
@@ -24,6 +24,12 @@ const DEVICE_PIXEL_SECONDS: f64 = 1e-8;
 impl Setup {
     /// Whether an image is finished by the stage that encodes it: the processor is free while a GPU renders the next one.
     pub(super) const fn finishes_when_encoding(&self) -> bool {
+        matches!(self.picture.renderer, RendererKind::Gpu)
+    }
+
+    /// Whether the next frame is read while one is built: to build on a GPU is to copy the frame there, which takes about as
+    /// long as to read it.
+    pub(super) const fn reads_while_building(&self) -> bool {
         matches!(self.picture.renderer, RendererKind::Gpu)
     }
 

@@ -103,6 +103,13 @@ impl TraceStage<'_> {
         is_built: Option<SyncSender<()>>,
         mut next: ToEncoders,
     ) {
+        let read_next = || {
+            if let Some(is_built) = &is_built {
+                // The reader may have ended
+                let _ = is_built.send(());
+            }
+        };
+        let reads_early = self.setup.reads_while_building();
         let mut tracer = renderer_of(self.setup.picture.renderer);
         for StagedFrame { claimed, result } in loaded {
             // Drop a frame that was read but not started when the interrupt was raised
@@ -111,14 +118,16 @@ impl TraceStage<'_> {
             }
             let number = claimed.frame;
             let failure = |error: ImageError| error.into_failure(number);
+            if reads_early {
+                read_next();
+            }
             let built = result.and_then(|frame| {
                 self.context.report_stage(number, "tracing");
                 let build = || tracer.prepare(self.setup, frame);
                 catch_panic(|| Ok(in_pool(build)?)).map_err(failure)
             });
-            if let Some(is_built) = &is_built {
-                // The reader may have ended
-                let _ = is_built.send(());
+            if !reads_early {
+                read_next();
             }
             // Trace the image, in the planes of an earlier one
             let traced = built.and_then(|mut frame| {

@@ -1,8 +1,9 @@
 //! The three stages of a run: while frame i is traced, frame i+1 is read and frame i-1 is encoded and written.
 //!
 //! One frame is in flight per stage, handed over without a queue, so memory is constant however long the sequence is.
-//! Where encoding is the slowest stage, a fixed number of images are encoded at the same time. Reading waits until the tree of the previous frame is built: building takes little time, and releases the
-//! positions of that frame. Reading has threads of its own, so that it never waits for tracing. The planes of a
+//! Where encoding is the slowest stage, a fixed number of images are encoded at the same time. Reading waits until the
+//! tree of the previous frame is built: building takes little time, and releases the positions of that frame. On a GPU,
+//! it does not wait. Reading has threads of its own, so that it never waits for tracing. The planes of a
 //! written image are returned to the tracer. One thread records every frame in the job, after its image and in the order
 //! of the run.
 

@@ -99,13 +99,15 @@ impl MemoryModel<'_> {
     fn building(&self, place: &Place<'_>) -> MemoryNeed {
         let frame = place.frame;
         let kept = self.kept(frame);
+        let next_read = |next| self.reading_with_meshes(next);
         let surface = self.surface(frame);
         let encoded = place.before.min(place.neighbours.encoders);
         let meshes = self.meshes_beside(frame);
         let all = MemoryNeed {
             particles: kept,
             // The kept data are in the memory that the allocator retains.
-            reading: shared(frame).max(self.retained(frame).saturating_sub(kept)),
+            reading: shared(frame).max(self.retained(frame).saturating_sub(kept))
+                + place.after.filter(|_| self.setup.reads_while_building()).map_or(0, next_read),
             images: self.film() * place.before.min(place.neighbours.encoders + 1)
                 + self.unfinished(frame, encoded),
             encoding: encoded * self.encoding(),

@@ -215,7 +215,7 @@ impl Case {
 
     /// How the picture is denoised, if it is.
     pub(crate) fn denoise(&self) -> Option<DenoiseSettings> {
-        (self.paths.is_some() && self.samples >= 2).then_some(DenoiseSettings::OPAQUE)
+        (self.samples >= 2).then_some(DenoiseSettings::OPAQUE)
     }
 
     /// The settings of the picture.
@@ -238,7 +238,7 @@ impl Case {
             } else {
                 IndirectLight::Traced
             },
-            has_features: self.paths.is_some(),
+            has_features: self.denoise().is_some(),
             transparent_background: self.has_mattes
                 || matches!(self.paths, Some(Paths::Catcher | Paths::Coats)),
             samples: self.samples,
