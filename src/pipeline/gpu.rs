@@ -213,12 +213,12 @@ fn need_of(setup: &Setup, sequence: &Sequence, particles: u64, max_array: u64) -
 /// # Errors
 /// The first reason why it is not; nothing if the program has no renderer for GPUs.
 pub fn suits(setup: &Setup, sequence: &Sequence, particles: u64) -> Result<(), Option<String>> {
-    // Look for a device only if it could be used
-    if let Some((key, what)) = lacking(setup) {
-        return Err(Some(format!("{key}: {what} cannot be rendered on a GPU yet")));
-    }
     if CHOSEN.get().is_none() && !super::vulkan::has_device_file() {
         return Err(Some("there is no GPU (spherule devices says more)".to_owned()));
+    }
+    // Open a device only if it could be used
+    if let Some((key, what)) = lacking(setup) {
+        return Err(Some(format!("{key}: {what} cannot be rendered on a GPU yet")));
     }
     let device = device().map_err(|error| Some(error.to_string()))?;
     let AdapterSummary { name, is_software, max_array, .. } = device.adapter();
