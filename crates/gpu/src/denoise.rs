@@ -4,14 +4,13 @@
 use std::fmt::Write as _;
 
 use bytemuck::{Pod, Zeroable};
-use spherule_tracer::denoise::DenoiseSettings;
 use spherule_tracer::denoise::device::{CONSTANTS, shares};
 use wgpu::BindingResource;
 
 use crate::arrays::{Array, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel};
-use crate::picture::Picture;
-use crate::tree::GROUPS;
+use crate::picture::{Denoising, Picture};
+use crate::tree_kernels::GROUPS;
 use crate::{Device, GpuError};
 
 /// Pixels along a side of a tile.
@@ -48,15 +47,6 @@ struct Settings {
     color_scale: f32,
     is_bounded: u32,
     zeros: [u32; 2],
-}
-
-/// How a picture is denoised.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Denoising {
-    /// Of the filter.
-    pub settings: DenoiseSettings,
-    /// Whether colours are at least 0, and coverage is 0 to 1: those of a picture with a shadow catcher.
-    pub is_bounded: bool,
 }
 
 #[derive(Debug)]

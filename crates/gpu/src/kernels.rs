@@ -4,7 +4,8 @@ use crate::Device;
 use crate::commands::Kernel;
 use crate::picture::Picture;
 use crate::spheres::Encoding;
-use crate::tree::{CODED_CENTERS, GROUPS, TreeShape, encoding_constant, tree_constants};
+use crate::tree::TreeShape;
+use crate::tree_kernels::{CODED_CENTERS, GROUPS, encoding_constant, tree_constants};
 
 /// Entries of the traversal's stack for each level of nodes: all children but the one that is visited next.
 const STACK_PER_LEVEL: u32 = 7;

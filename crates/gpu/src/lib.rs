@@ -93,6 +93,7 @@ mod device;
 mod error;
 mod kernels;
 mod lighting;
+mod memory;
 mod open;
 mod picture;
 mod pixels;
@@ -102,21 +103,25 @@ mod scene_lighting;
 mod self_test;
 mod spheres;
 mod stored;
+mod trace_arrays;
 mod tree;
+mod tree_kernels;
+mod tree_need;
 
 pub use arithmetic::Arithmetic;
-pub use denoise::Denoising;
 pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
 pub use lighting::{
     Catcher, Detail, Environment, Finish, Ground, Lighting, MAX_FINISHES, Model, Rough, TablePlace,
     Tables,
 };
+pub use memory::{bytes_per_pixel, host_bytes_per_pixel, largest_array};
 pub use picture::{
-    Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
+    Background, Camera, Denoising, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture,
+    Samples,
 };
 pub use pixels::{Cost, HostPixels, LightLayer, NearestSample, Pixels, SampleObject};
-pub use renderer::{Colors, Renderer, bytes_per_pixel, host_bytes_per_pixel, largest_array};
+pub use renderer::{Colors, Renderer};
 pub use scene::{HostImage, Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
-pub use tree::{MAX_SPHERES, TreeNeed};
+pub use tree_need::{MAX_SPHERES, TreeNeed};

@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use spherule_tracer::denoise::DenoiseSettings;
 use spherule_tracer::render::PathSeed;
 
-use crate::denoise::Denoising;
 use crate::lighting::{Detail, Lighting, Model, RayKinds};
 
 /// Largest number of lights.
@@ -167,6 +167,15 @@ pub struct Camera {
     pub is_parallel: bool,
     /// Radius of the lens, and distance of the plane in focus; path tracing only.
     pub lens: Option<[f32; 2]>,
+}
+
+/// How a picture is denoised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Denoising {
+    /// Of the filter.
+    pub settings: DenoiseSettings,
+    /// Whether colours are at least 0, and coverage is 0 to 1: those of a picture with a shadow catcher.
+    pub is_bounded: bool,
 }
 
 /// The part of the image that is rendered.

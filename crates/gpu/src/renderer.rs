@@ -4,19 +4,18 @@
 use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
-use spherule_tracer::render::device::{mirrors_see_through, needs_light_parts};
-use spherule_tracer::render::{IntegratorKind, RenderSettings};
-use spherule_tracer::scene::Scene;
 use wgpu::BindingResource;
 
-use crate::arrays::{Array, Downloads, Uniform, Uniforms};
+use crate::arrays::{Downloads, Uniform, Uniforms};
 use crate::commands::{Commands, Timer};
-use crate::denoise::{self, Denoiser};
+use crate::denoise::Denoiser;
 use crate::kernels::{Kernels, Variant};
-use crate::lighting::{Lighting, Model, RayKinds, SceneUniform};
-use crate::picture::{FIRST_GROUP, FilmSize, Picture, Samples, View, most_kept};
-use crate::pixels::{Cost, HostPixels, NearestSample};
+use crate::lighting::{Model, SceneUniform};
+use crate::memory::{DATA_BYTES, film_bytes, layer_bytes, object_bytes};
+use crate::picture::{FilmSize, Picture, Samples, View};
+use crate::pixels::{Cost, HostPixels};
 use crate::spheres::Spheres;
+use crate::trace_arrays::TraceArrays;
 use crate::tree::{TreeBuilder, TreeShape};
 use crate::{Device, GpuError};
 
@@ -90,153 +89,6 @@ struct Traced {
     is_denoised: bool,
     has_objects: bool,
     layers: u32,
-}
-
-#[derive(Debug, Default)]
-struct TraceArrays {
-    colors: Array,
-    points: Array,
-    sets: Array,
-    /// The film that `sets` belongs to, and the content of `points`.
-    sampled: Option<(FilmSize, Vec<[f32; 2]>)>,
-    film: Array,
-    data: Array,
-    queued: Array,
-    rays: [Array; 2],
-    shadows: Array,
-    sums: Array,
-    texels: Array,
-    constants: Array,
-    detail: Array,
-    objects: Array,
-    layers: Array,
-    kept: Array,
-    /// The version of the tables of the environment and of materials that the arrays hold.
-    tables: Option<u64>,
-}
-
-impl TraceArrays {
-    fn all(&self) -> [&Array; 16] {
-        let [rays, other_rays] = &self.rays;
-        [
-            &self.colors,
-            &self.points,
-            &self.sets,
-            &self.film,
-            &self.data,
-            &self.queued,
-            rays,
-            other_rays,
-            &self.shadows,
-            &self.sums,
-            &self.texels,
-            &self.constants,
-            &self.detail,
-            &self.objects,
-            &self.layers,
-            &self.kept,
-        ]
-    }
-
-    /// Copies the tables of `lighting`, unless they are there.
-    fn write_tables(&mut self, device: &Device, lighting: &Lighting) -> Result<(), GpuError> {
-        let tables = &lighting.tables;
-        if self.tables != Some(tables.version) {
-            self.tables = None;
-            self.texels.write(device, "environment", bytemuck::cast_slice(&tables.texels))?;
-            self.constants.write(device, "tables", bytemuck::cast_slice(&tables.constants))?;
-            let detail = lighting.environment.as_ref().and_then(|of| of.detail.as_ref());
-            let halves = detail.map_or(&[][..], |detail| detail.map.bits());
-            // Copies are whole words
-            let padded: Vec<u16>;
-            let halves = if halves.len().is_multiple_of(2) {
-                halves
-            } else {
-                padded = [halves, &[0]].concat();
-                &padded
-            };
-            let what = "the pixels of the environment (environment.detail)";
-            self.detail.write(device, what, bytemuck::cast_slice(halves))?;
-            self.tables = Some(tables.version);
-        }
-        Ok(())
-    }
-}
-
-/// Memory of the film for each pixel, bytes. `is_denoised`: it has the sums over every second sample.
-const fn film_bytes(is_denoised: bool, has_clamp: bool) -> u64 {
-    16 * (1 + is_denoised as u64 + has_clamp as u64)
-}
-
-/// Memory of the nearest sample of a pixel, bytes.
-const DATA_BYTES: u64 = size_of::<NearestSample>() as u64;
-
-/// Memory of the first surfaces of the samples of a pixel, bytes.
-const fn object_bytes(has_objects: bool, samples: u32) -> u64 {
-    if has_objects { 4 * samples as u64 } else { 0 }
-}
-
-/// Memory of the layers of light of a pixel, bytes. With a limit of indirect light, each has a second place.
-const fn layer_bytes(layers: u32, has_clamp: bool) -> u64 {
-    16 * layers as u64 * (1 + has_clamp as u64)
-}
-
-/// Number of light groups of a picture with these settings, if it has light by parts.
-pub(crate) fn light_groups_of(settings: &RenderSettings) -> Option<u32> {
-    let channels = &settings.channels;
-    needs_light_parts(channels).then(|| channels.layers.light_groups.into())
-}
-
-/// What the rays of a picture of `scene` with these settings are, and the memory of a pixel for the first surfaces and for
-/// the layers of light.
-fn needs_of(scene: &Scene, settings: &RenderSettings) -> (RayKinds, [u64; 2]) {
-    let light_groups = light_groups_of(settings);
-    let has_paths = settings.integrator == IntegratorKind::Path;
-    let rays = RayKinds {
-        has_paths,
-        has_mirrors: has_paths && mirrors_see_through(scene, settings),
-        has_layers: light_groups.is_some(),
-        kept: (scene.particle_material().transmission > 0.0)
-            .then(|| most_kept(settings.min_weight, settings.max_depth)),
-        lights: u32::try_from(scene.lights.len()).unwrap_or(u32::MAX),
-    };
-    let objects = object_bytes(settings.channels.mattes().next().is_some(), settings.samples);
-    let layers = light_groups.map_or(0, |groups| FIRST_GROUP + groups);
-    (rays, [objects, layer_bytes(layers, settings.clamp.is_some())])
-}
-
-/// The largest array for the pixels and rays of a picture, bytes.
-pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
-    let (rays, [objects, layers]) = needs_of(scene, settings);
-    let shadows = rays.shadow_bytes() * u64::from(rays.sources());
-    let pixels = u64::from(settings.width) * u64::from(settings.height);
-    let denoiser = if settings.has_features { denoise::LARGEST_PER_PIXEL } else { 0 };
-    let arrays = [shadows, rays.ray_bytes(), rays.kept_bytes(), objects, layers, denoiser];
-    arrays.into_iter().max().unwrap_or_default() * pixels
-}
-
-/// Memory of the device for the film and the queues of each pixel, bytes.
-pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
-    let (rays, [objects, layers]) = needs_of(scene, settings);
-    let film = film_bytes(settings.has_features, rays.has_paths && settings.clamp.is_some());
-    let denoiser = if settings.has_features { denoise::BYTES_PER_PIXEL } else { 0 };
-    let shadows = rays.shadow_bytes() * u64::from(rays.sources());
-    4 + film
-        + denoiser
-        + DATA_BYTES
-        + objects
-        + layers
-        + 2 * rays.ray_bytes()
-        + shadows
-        + rays.kept_bytes()
-}
-
-/// Memory of the host for each pixel that was traced and is not stored yet, bytes.
-pub fn host_bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
-    let (_, [objects, _]) = needs_of(scene, settings);
-    let layers = light_groups_of(settings).map_or(0, |groups| FIRST_GROUP + groups);
-    let films = 1 + u64::from(settings.has_features);
-    films * film_bytes(false, false) + DATA_BYTES + objects + layer_bytes(layers, false)
 }
 
 impl Renderer {

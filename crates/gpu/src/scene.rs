@@ -22,17 +22,18 @@ use spherule_tracer::scene::{
 use spherule_tree::accel;
 use spherule_tree::blocks::StoredLeaves;
 
-use crate::denoise::Denoising;
 use crate::lighting::Model;
+use crate::memory::light_groups_of;
 use crate::picture::{
-    Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
+    Background, Camera, Denoising, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture,
+    Samples,
 };
 use crate::pixels::{Cost, HostPixels, LightLayer, NearestSample, Pixels};
-use crate::renderer::{Colors, Renderer, light_groups_of};
+use crate::renderer::{Colors, Renderer};
 use crate::scene_lighting::SceneLighting;
 use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
 use crate::stored::{centers_of, grids_of};
-use crate::tree::TreeNeed;
+use crate::tree_need::TreeNeed;
 use crate::{Device, GpuError};
 
 /// What the device lacks of the renderer for CPUs.

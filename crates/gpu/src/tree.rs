@@ -10,26 +10,13 @@ use wgpu::BindingResource;
 
 use crate::arrays::{Array, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel, Timer};
-use crate::spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
+use crate::spheres::{Centers, Encoding, KeyLength, Order, Radii, Spheres};
+use crate::tree_kernels::{KeyKernels, KeyVariant, NodeKernels, NodeVariant, SortKernels};
+use crate::tree_need::{
+    BLOCK, BYTES_OF_SPHERE, MAX_SPHERES, TILE, WIDTH, block_count, blocks_of_part, largest_part,
+    level_sizes,
+};
 use crate::{Device, GpuError};
-
-/// Spheres in a block, the constant `BLOCK` of the shaders.
-pub(crate) const BLOCK: u64 = 8;
-/// Children of a node.
-const WIDTH: u64 = 8;
-/// Pairs that a workgroup sorts.
-const TILE: u64 = 2048;
-/// Largest number of spheres: their places have 28 bits for the block.
-pub const MAX_SPHERES: u64 = BLOCK << 28;
-
-/// Bytes of a sphere in the largest array of a tree.
-const BYTES_OF_SPHERE: u64 = 16;
-
-/// Number of spheres whose tree has no array larger than so many bytes.
-pub(crate) const fn spheres_within(max_array: u64) -> u64 {
-    let count = max_array / BYTES_OF_SPHERE;
-    if count < MAX_SPHERES { count } else { MAX_SPHERES }
-}
 
 /// What the levels of a tree are.
 #[derive(Debug, Clone, Copy, Default)]
@@ -82,144 +69,6 @@ struct Build {
     blocks_before: u32,
     nodes_before: u32,
     zeros: [u32; 4],
-}
-
-/// What kernels for keys depend on: the length, and how centres are stored. Only centres in any order have keys.
-type KeyVariant = (KeyLength, Encoding);
-/// What kernels for nodes depend on: whether radii are equal, how centres are stored, whether they stay coded, and whether
-/// spheres move.
-type NodeVariant = (bool, Encoding, bool, bool);
-
-/// Kernels for keys of one length.
-#[derive(Debug)]
-struct KeyKernels {
-    clear_bounds: Kernel,
-    find_bounds: Kernel,
-    first_keys: Kernel,
-    next_keys: Kernel,
-    keep_order: Kernel,
-}
-
-impl KeyKernels {
-    fn new(device: &Device, (length, encoding): KeyVariant) -> Self {
-        let bits = format!("const BITS: u32 = {}u;\n", 8 * length.words());
-        let encoding = encoding_constant(encoding);
-        let source = [&bits, &encoding, BUILD, GROUPS, CENTERS, include_str!("shaders/keys.wgsl")];
-        let module = device.module(&source.concat());
-        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
-        Self {
-            clear_bounds: kernel("clear_bounds", &[2]),
-            find_bounds: kernel("find_bounds", &[0, 1, 2]),
-            first_keys: kernel("first_keys", &[0, 1, 2, 4]),
-            next_keys: kernel("next_keys", &[0, 1, 2, 3, 4]),
-            keep_order: kernel("keep_order", &[0, 4]),
-        }
-    }
-}
-
-/// Kernels that sort.
-#[derive(Debug)]
-struct SortKernels {
-    histogram: Kernel,
-    scan_digits: Kernel,
-    scatter: Kernel,
-}
-
-impl SortKernels {
-    fn new(device: &Device) -> Self {
-        let module = device.module(&[BUILD, include_str!("shaders/sort.wgsl")].concat());
-        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
-        Self {
-            histogram: kernel("histogram", &[0, 3, 5]),
-            scan_digits: kernel("scan_digits", &[0, 5, 6]),
-            scatter: kernel("scatter", &[0, 3, 4, 5, 6]),
-        }
-    }
-}
-
-/// Kernels that build nodes, for spheres with a common radius or one for each.
-#[derive(Debug)]
-struct NodeKernels {
-    /// Unless spheres stay coded.
-    gather_spheres: Option<Kernel>,
-    block_boxes: Kernel,
-    build_level: Kernel,
-}
-
-impl NodeKernels {
-    fn new(
-        device: &Device,
-        (is_common, encoding, keeps_codes, has_motion): NodeVariant,
-        part: &str,
-    ) -> Self {
-        let is_coded = matches!(encoding, Encoding::Q16 | Encoding::Q10);
-        let motion = format!("const HAS_MOTION: bool = {has_motion};\n");
-        let centers = if is_coded {
-            [
-                part,
-                device.arithmetic().source(),
-                ARITHMETIC,
-                CODED_CENTERS,
-                include_str!("shaders/coded_build.wgsl"),
-            ]
-            .concat()
-        } else {
-            CENTERS.to_owned()
-        };
-        let blocks = if keeps_codes {
-            include_str!("shaders/coded_blocks.wgsl")
-        } else {
-            include_str!("shaders/blocks.wgsl")
-        };
-        let source = [
-            &tree_constants(is_common),
-            &motion,
-            &encoding_constant(encoding),
-            BUILD,
-            GROUPS,
-            &centers,
-            blocks,
-            include_str!("shaders/nodes.wgsl"),
-        ];
-        let module = device.module(&source.concat());
-        let of_centers: &[u32] = if is_coded { &[15, 16, 17] } else { &[] };
-        let kernel = |entry, bindings: &[u32]| {
-            Kernel::new(device, &module, entry, &[bindings, of_centers].concat())
-        };
-        Self {
-            gather_spheres: (!keeps_codes)
-                .then(|| kernel("gather_spheres", &[0, 1, 3, 7, 8, 9, 13, 14])),
-            block_boxes: if keeps_codes {
-                kernel("block_boxes", &[0, 1, 11])
-            } else {
-                kernel("block_boxes", &[0, 1, 3, 7, 8, 11, 14])
-            },
-            build_level: Kernel::new(device, &module, "build_level", &[0, 10, 11, 12]),
-        }
-    }
-}
-
-/// What several shaders have in common.
-const BUILD: &str = include_str!("shaders/build.wgsl");
-const CENTERS: &str = include_str!("shaders/centers.wgsl");
-pub(crate) const GROUPS: &str = include_str!("shaders/groups.wgsl");
-const ARITHMETIC: &str = include_str!("shaders/arithmetic.wgsl");
-pub(crate) const CODED_CENTERS: &str = include_str!("shaders/coded_centers.wgsl");
-
-/// The constant of the shaders for how centres are stored.
-pub(crate) fn encoding_constant(encoding: Encoding) -> String {
-    let number = match encoding {
-        Encoding::Points => 0,
-        Encoding::Blocks => 1,
-        Encoding::Q16 => 2,
-        Encoding::Q10 => 3,
-    };
-    format!("const ENCODING: u32 = {number}u;\n")
-}
-
-/// Constants of the shaders that read spheres.
-pub(crate) fn tree_constants(is_common: bool) -> String {
-    format!("const BLOCK: u32 = {BLOCK}u;\nconst COMMON_RADIUS: bool = {is_common};\n")
 }
 
 /// Builds the tree of one frame after another in the same memory.
@@ -282,88 +131,6 @@ impl TreeArrays {
             &self.wide,
             &self.more_centers,
         ]
-    }
-}
-
-/// Centres in a block of a native frame.
-const LANES: u64 = 16;
-
-/// Bytes of the box of a block.
-const BYTES_OF_BOX: u64 = 24;
-
-/// Coded blocks whose boxes are computed together, with arrays of so many bytes: a multiple of [`WIDTH`], 1.6 GB at most.
-fn blocks_of_part(max_array: u64) -> u64 {
-    (max_array / BYTES_OF_BOX / WIDTH * WIDTH).clamp(WIDTH, 1 << 26)
-}
-
-/// Words of coded centres in an array of so many bytes: whole blocks in both encodings. Their numbers have 32 bits.
-const fn largest_part(max_array: u64) -> u64 {
-    let words = max_array / 4 / 48 * 48;
-    if words < 1 << 30 { words } else { 1 << 30 }
-}
-
-/// Number of blocks of `count` spheres; an empty tree has one.
-const fn block_count(count: u64) -> u64 {
-    let blocks = count.div_ceil(BLOCK);
-    if blocks == 0 { 1 } else { blocks }
-}
-
-/// Numbers of nodes of each level, from the lowest on.
-fn level_sizes(blocks: u64) -> Vec<u64> {
-    let mut sizes = vec![blocks.div_ceil(WIDTH)];
-    while let Some(below) = sizes.last().filter(|below| **below > 1) {
-        sizes.push(below.div_ceil(WIDTH));
-    }
-    sizes
-}
-
-/// What the memory of a tree depends on.
-#[derive(Debug, Clone, Copy)]
-pub struct TreeNeed {
-    /// Number of spheres.
-    pub count: u64,
-    /// Whether they have the same radius.
-    pub is_common: bool,
-    /// Whether they move while the shutter is open.
-    pub has_motion: bool,
-    /// How their centres are stored.
-    pub encoding: Encoding,
-}
-
-impl TreeNeed {
-    /// Whether the centres have to stay coded, so that a device with arrays of so many bytes holds them.
-    pub const fn keeps_codes(&self, max_array: u64) -> bool {
-        let is_coded = matches!(self.encoding, Encoding::Q16 | Encoding::Q10);
-        is_coded && self.is_common && !self.has_motion && self.count > spheres_within(max_array)
-    }
-
-    /// The largest number of such spheres that a device with arrays of so many bytes holds.
-    pub fn max_count(&self, max_array: u64) -> u64 {
-        let coded = Self { count: u64::MAX, ..*self };
-        if !coded.keeps_codes(max_array) {
-            return spheres_within(max_array);
-        }
-        let in_words = 2 * largest_part(max_array) / self.encoding.words() * LANES;
-        let in_grids = max_array / size_of::<Grid>() as u64 * LANES;
-        in_words.min(in_grids).min(MAX_SPHERES)
-    }
-
-    /// Memory of a device with arrays of so many bytes to build and trace the tree, bytes.
-    pub fn bytes(&self, max_array: u64) -> u64 {
-        let Self { count, is_common, has_motion, encoding } = *self;
-        let blocks = block_count(count);
-        let nodes: u64 = 64 * level_sizes(blocks).iter().sum::<u64>();
-        let of_grids = if encoding.words() == 48 { 0 } else { size_of::<Grid>() as u64 };
-        let of_centers = (4 * encoding.words() + of_grids) * count.div_ceil(LANES);
-        if self.keeps_codes(max_array) {
-            let boxes = 2 * BYTES_OF_BOX * blocks.min(blocks_of_part(max_array));
-            return of_centers + nodes + boxes;
-        }
-        let radii = if is_common { 0 } else { 4 + 4 };
-        let of_spheres = (2 * 8 + radii) * count + BYTES_OF_SPHERE * blocks * BLOCK;
-        let of_motion = if has_motion { 12 * count + 16 * blocks * BLOCK } else { 0 };
-        let of_sort = 1024 * count.div_ceil(TILE);
-        of_centers + of_spheres + of_motion + of_sort + 48 * blocks + nodes
     }
 }
 
