@@ -90,6 +90,7 @@ const FLAGS: [(&str, &str); 70] = [
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--surface smooth --exact-surface", "surface.exact = true"),
     ("--surface smooth --spray", "surface.spray = true"),
+    ("--surface smooth --whitewater", "surface.whitewater = true"),
     ("--no-mmap", "input.mmap = false"),
     ("--follow-links", "input.follow_links = true"),
     ("--mesh-points", "input.mesh_points = true"),

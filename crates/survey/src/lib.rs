@@ -174,6 +174,10 @@ pub struct Survey {
     /// Size of the heaviest sampled frame. Jobs of the first versions lack it.
     #[serde(default)]
     pub weight: Option<FrameWeight>,
+    /// Speed of the fastest particles: the 99th percentile of the frame where it is the highest. Jobs of earlier versions
+    /// lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f32>,
     /// The surfaces of some of the sampled frames, if they were requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<SurfaceWeight>,
