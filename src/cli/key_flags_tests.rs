@@ -33,7 +33,7 @@ const LISTS: [&str; 12] = [
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 70] = [
+const FLAGS: [(&str, &str); 71] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),

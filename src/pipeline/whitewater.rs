@@ -46,9 +46,9 @@ impl FrameDrops {
         let radius = common_radius(&frame.radius);
         let ids = frame.shading.ids.as_deref().and_then(|all| all.get(..count));
         let flow = Flow { centers: &frame.centers, velocities, ids, radius };
-        let amount = surface.whitewater_amount;
+        let (amount, size) = (surface.whitewater_amount, surface.whitewater_size);
         let Whitewater { atomized, mut drops, left_out } =
-            Whitewater::of(flow, WhitewaterSettings { speed, amount });
+            Whitewater::of(flow, WhitewaterSettings { speed, amount, size });
         if left_out > 0 {
             notes.push(format!(
                 "{left_out} drops of whitewater are left out, because there are more than {}; a smaller \

@@ -74,6 +74,8 @@ pub struct SurfaceSettings {
     pub whitewater_speed: Option<f32>,
     /// Factor on the number of drops of whitewater.
     pub whitewater_amount: f32,
+    /// Factor on the radii of these drops.
+    pub whitewater_size: f32,
 }
 
 impl SurfaceSettings {
@@ -91,6 +93,7 @@ impl SurfaceSettings {
         whitewater: false,
         whitewater_speed: None,
         whitewater_amount: 1.0,
+        whitewater_size: 1.0,
     };
 
     /// Support of the SPH kernel in particle radii.

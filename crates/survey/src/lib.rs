@@ -80,7 +80,7 @@ pub use tank::Tank;
 use totals::Totals;
 pub use walls::{WallSign, WallValues};
 use weight::has_surface;
-pub use weight::{FrameWeight, SurfaceQuestion, SurfaceWeight};
+pub use weight::{DropCount, FrameWeight, SurfaceQuestion, SurfaceWeight};
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;

@@ -277,6 +277,15 @@ fn frames_of_spray_alone_are_predicted() {
 }
 
 #[test]
+fn whitewater_is_predicted_from_the_survey() {
+    // Particles are far from each other and equally fast, so that most of them are spray
+    let white = ["--look", "water", "--whitewater", "--radius", "0.002"];
+    let fewer = ["--set", "surface.whitewater_amount=0.2"];
+    let options = [&SMALL[..], &white, &fewer].concat();
+    compare_bound("vtk", |path| vtk(path, 20_000, true), &options);
+}
+
+#[test]
 fn moving_spheres_are_predicted() {
     let blur = ["--set", "camera.shutter=0.5", "--set", "output.frame_time=0.04"];
     let options = [&SMALL[..], &blur].concat();

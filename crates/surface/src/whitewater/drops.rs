@@ -6,7 +6,7 @@ use crate::spray::{point_in_ball, random};
 use spherule_tree::math::functions::{exp, ln, pow};
 
 /// Number of drops of a particle with the highest potential.
-pub const MAX_DROPS_EACH: u32 = 48;
+pub const MAX_DROPS_EACH: u32 = 160;
 
 /// Dimension of the random number that decides whether a particle is nothing but spray.
 pub(super) const ATOMIZED: u32 = 1 << 24;
@@ -21,14 +21,14 @@ const DIMENSIONS: u32 = 5;
 /// that no gaps are between the drops of neighbours.
 const SPREAD: f32 = 2.2;
 
-/// The same for particles that are nothing but spray; tuned by eye.
-const SPRAY_SPREAD: f32 = 3.0;
+/// The same for particles that are nothing but spray, most of which is nearer; tuned by eye.
+const SPRAY_SPREAD: f32 = 4.5;
 
 /// Least, mean and greatest radius of spray in radii of the particle; tuned by eye.
-const SPRAY_RADII: [f32; 3] = [0.03, 0.09, 0.4];
+const SPRAY_RADII: [f32; 3] = [0.012, 0.04, 0.2];
 
 /// Least and greatest radius of foam and bubbles in radii of the particle; tuned by eye.
-const BUBBLE_RADII: [f32; 2] = [0.08, 0.5];
+const BUBBLE_RADII: [f32; 2] = [0.045, 0.25];
 
 /// The number of bubbles of a radius in a breaking wave falls off with this power of it, above the scale at which
 /// turbulence breaks them up (Deane and Stokes 2002, "Scale dependence of bubble creation mechanisms in breaking waves",
@@ -53,8 +53,9 @@ pub(super) fn threshold(id: u32, number: u32) -> f32 {
 pub(super) fn candidate(id: u32, number: u32, is_atomized: bool) -> Candidate {
     let first = FIRST.wrapping_add(DIMENSIONS.wrapping_mul(number));
     let random = |dimension: u32| random(id, first.wrapping_add(dimension));
-    let spread = if is_atomized { SPRAY_SPREAD } else { SPREAD };
-    Candidate { offset: point_in_ball([1, 2, 3].map(random), spread), size: random(4) }
+    let point = point_in_ball([1, 2, 3].map(random), 1.0);
+    let offset = if is_atomized { SPRAY_SPREAD * point.length() * point } else { SPREAD * point };
+    Candidate { offset, size: random(4) }
 }
 
 impl Candidate {

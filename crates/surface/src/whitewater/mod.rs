@@ -68,6 +68,8 @@ pub struct WhitewaterSettings {
     pub speed: f32,
     /// Factor on the number of drops.
     pub amount: f32,
+    /// Factor on their radii.
+    pub size: f32,
 }
 
 /// Where a drop is.
@@ -115,22 +117,44 @@ impl Whitewater {
     /// If the arrays of `flow` have different lengths.
     #[must_use]
     pub fn of(flow: Flow<'_>, settings: WhitewaterSettings) -> Self {
+        Self::at_most(MAX_DROPS, flow, settings)
+    }
+
+    /// The same with about so many drops at most.
+    fn at_most(most: usize, flow: Flow<'_>, settings: WhitewaterSettings) -> Self {
         // A speed that is no number has no whitewater
         if !(settings.speed > 0.0 && settings.amount > 0.0) || flow.centers.is_empty() {
             return Self::default();
         }
-        let motions = Motions::of(&flow, settings.speed);
-        let (potential, atomized) = motions.potentials(&flow);
+        let motions = Motions::of(&flow);
+        let (potential, atomized) = motions.potentials(&flow, settings.speed);
         // Leave out a part if there are too many
         let source =
             Source { flow, settings, potential: &potential, atomized: &atomized, part: 1.0 };
         let count = source.count();
-        let part = if count > MAX_DROPS as u64 { MAX_DROPS as f32 / count as f32 } else { 1.0 };
+        let part = if count > most as u64 { most as f32 / count as f32 } else { 1.0 };
         let drops = Source { part, ..source }.drops(motions.bins());
         let left_out = count - drops.len() as u64;
         let places = (0..).zip(&atomized).filter(|(_, is_atomized)| **is_atomized);
         Self { atomized: places.map(|(index, _)| index).collect(), drops, left_out }
     }
+}
+
+/// Number of drops of `flow` at each of several `speeds` of violent water, with a factor `amount`.
+///
+/// # Panics
+/// If the arrays of `flow` have different lengths.
+#[must_use]
+pub fn drop_counts(flow: Flow<'_>, speeds: &[f32], amount: f32) -> Vec<u64> {
+    let motions = Motions::of(&flow);
+    let count = |speed: &f32| {
+        let (potential, atomized) = motions.potentials(&flow, *speed);
+        let settings = WhitewaterSettings { speed: *speed, amount, size: 1.0 };
+        let source =
+            Source { flow, settings, potential: &potential, atomized: &atomized, part: 1.0 };
+        if *speed > 0.0 { source.count().min(MAX_DROPS as u64) } else { 0 }
+    };
+    speeds.iter().map(count).collect()
 }
 
 /// Speed of violent water in a job whose fastest particles have this `speed`, and whose scene has this `height`. If all of
@@ -175,7 +199,7 @@ impl Source<'_> {
 
     /// The drops, with their classes by the particles in `bins` around them.
     fn drops(&self, bins: &Bins) -> Vec<Drop> {
-        let radius = self.flow.radius;
+        let (radius, factor) = (self.flow.radius, self.flow.radius * self.settings.size);
         let particles = (0..self.potential.len()).into_par_iter().with_min_len(1 << 8);
         particles
             .flat_map_iter(|particle| {
@@ -192,14 +216,14 @@ impl Source<'_> {
                         }
                     };
                     let particle = index_u32(particle);
-                    Drop { particle, offset, radius: radius * size, class }
+                    Drop { particle, offset, radius: factor * size, class }
                 })
             })
             .collect()
     }
 }
 
-/// Whether the particle `id` with this potential for kinetic energy, which has few neighbours, is nothing but spray.
+/// Whether the particle `id` with this potential of its energy, which has few neighbours, is nothing but spray.
 fn is_atomized(id: u32, energy: f32) -> bool {
     random(id, drops::ATOMIZED) < energy
 }

@@ -6,7 +6,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Flow, SPRAY, is_atomized};
+use super::{Flow, is_atomized};
 use crate::field::bins::Bins;
 
 /// Support of the kernel in particle radii. Particles at rest are two radii apart.
@@ -23,6 +23,13 @@ const TRAPPED_AIR: [f32; 2] = [0.06, 0.3];
 const CREST: [f32; 2] = [0.06, 0.25];
 /// See [`TRAPPED_AIR`]. The energy is the square of the speed.
 const ENERGY: [f32; 2] = [0.04, 0.5];
+
+/// The same for particles that are nothing but spray: drops that leave the water break up at once, unless they are slow.
+const ATOMIZING: [f32; 2] = [0.01, 0.1];
+
+/// Particles with at most this many within the support, themselves included, may be nothing but spray: the corner of a
+/// block has 8. Alone they would be balls of glass.
+const MAX_ALONE: u32 = 7;
 
 /// The least mean direction away from neighbours of a particle at the surface; it is 1/2 at a plane.
 const AT_SURFACE: f32 = 0.25;
@@ -88,7 +95,7 @@ impl Neighbourhood {
 #[derive(Debug, Clone, Copy, Default)]
 struct Motion {
     around: Neighbourhood,
-    /// Mean speed at which neighbours come nearer.
+    /// Mean speed at which neighbours come nearer, scene units per unit of time.
     trapped_air: f32,
 }
 
@@ -96,8 +103,6 @@ struct Motion {
 pub(super) struct Motions {
     bins: Bins,
     motions: Vec<Motion>,
-    /// Speed of violent water.
-    speed: f32,
 }
 
 /// `value` between `least`, which becomes 0, and `greatest`, which becomes 1 (equation 1 of the paper).
@@ -116,12 +121,14 @@ fn finite(velocity: Vec3) -> Vec3 {
 }
 
 impl Motions {
-    /// The motion at the particles of `flow`, relative to the `speed` of violent water.
-    pub(super) fn of(flow: &Flow<'_>, speed: f32) -> Self {
-        let bins = Bins::sort(flow.centers, REACH * flow.radius, true);
+    /// The motion at the particles of `flow`.
+    pub(super) fn of(flow: &Flow<'_>) -> Self {
+        // Sums must not depend on the order in the file
+        let mut bins = Bins::sort(flow.centers, REACH * flow.radius, true);
+        bins.order_by_position();
         let places = (0..bins.points().len()).into_par_iter().with_min_len(1 << 8);
-        let motions = places.map(|place| motion_at(&bins, flow, speed, place)).collect();
-        Self { bins, motions, speed }
+        let motions = places.map(|place| motion_at(&bins, flow, place)).collect();
+        Self { bins, motions }
     }
 
     /// The particles, sorted into bins of the size of the support.
@@ -135,10 +142,12 @@ impl Motions {
         self.motions.iter().map(|motion| motion.trapped_air).fold(0.0, f32::max)
     }
 
-    /// The potential of each particle of `flow`, in its order, and whether it is nothing but spray.
-    pub(super) fn potentials(&self, flow: &Flow<'_>) -> (Vec<f32>, Vec<bool>) {
+    /// The potential of each particle of `flow`, in its order, and whether it is nothing but spray; `speed` is that of
+    /// violent water.
+    pub(super) fn potentials(&self, flow: &Flow<'_>, speed: f32) -> (Vec<f32>, Vec<bool>) {
         let places = (0..self.motions.len()).into_par_iter().with_min_len(1 << 8);
-        let found: Vec<(f32, bool)> = places.map(|place| self.potential_at(flow, place)).collect();
+        let found: Vec<(f32, bool)> =
+            places.map(|place| self.potential_at(flow, speed, place)).collect();
         let mut potentials = vec![0.0; flow.centers.len()];
         let mut atomized = vec![false; flow.centers.len()];
         for ((potential, is_atomized), index) in found.into_iter().zip(self.bins.indices()) {
@@ -149,21 +158,21 @@ impl Motions {
     }
 
     /// The potential of the particle at `place`, and whether it is nothing but spray.
-    fn potential_at(&self, flow: &Flow<'_>, place: usize) -> (f32, bool) {
+    fn potential_at(&self, flow: &Flow<'_>, speed: f32, place: usize) -> (f32, bool) {
         let index = self.bins.indices()[place];
-        let velocity = finite(flow.velocities[index as usize]) / self.speed;
+        let velocity = finite(flow.velocities[index as usize]) / speed;
         let energy = clamped(velocity.length_squared(), ENERGY);
         let motion = &self.motions[place];
-        // The particle is its own neighbour
-        if motion.around.count <= SPRAY {
+        if motion.around.count <= MAX_ALONE {
             let id = flow.ids.map_or(index, |ids| ids[index as usize]);
+            let energy = clamped(velocity.length_squared(), ATOMIZING);
             let is_spray = is_atomized(id, energy);
             return (if is_spray { 1.0 } else { 0.0 }, is_spray);
         }
         if energy == 0.0 {
             return (0.0, false);
         }
-        let air = clamped(motion.trapped_air, TRAPPED_AIR);
+        let air = clamped(motion.trapped_air / speed, TRAPPED_AIR);
         let crest = clamped(self.crest_at(place, velocity), CREST);
         (energy * (air + crest).min(1.0), false)
     }
@@ -189,10 +198,9 @@ impl Motions {
     }
 }
 
-/// The motion of `flow` at `place` in `bins`: equation 2 of the paper, in units of `speed` and of the sum at rest.
-fn motion_at(bins: &Bins, flow: &Flow<'_>, speed: f32, place: usize) -> Motion {
-    let velocity_of =
-        |place: usize| finite(flow.velocities[bins.indices()[place] as usize]) / speed;
+/// The motion of `flow` at `place` in `bins`: equation 2 of the paper, in units of the sum at rest.
+fn motion_at(bins: &Bins, flow: &Flow<'_>, place: usize) -> Motion {
+    let velocity_of = |place: usize| finite(flow.velocities[bins.indices()[place] as usize]);
     let (point, velocity) = (bins.points()[place], velocity_of(place));
     let mut air = 0.0;
     each_neighbour(bins, point, |other, offset, distance| {

@@ -5,7 +5,7 @@ use super::potential::{Motions, SUM_AT_REST};
 use super::*;
 
 const RADIUS: f32 = 0.5;
-const CALM: WhitewaterSettings = WhitewaterSettings { speed: 10.0, amount: 1.0 };
+const CALM: WhitewaterSettings = WhitewaterSettings { speed: 10.0, amount: 1.0, size: 1.0 };
 
 /// A lattice of `size` particles that touch each other.
 fn block(size: [u8; 3]) -> Vec<Vec3> {
@@ -47,7 +47,7 @@ fn streams_that_collide_trap_air() {
     // Apart, they trap about a third of it: neighbours beside the direction of motion count half
     let trapped = |sign: f32| {
         let velocities: Vec<Vec3> = centers.iter().map(|center| sign * towards(*center)).collect();
-        Motions::of(&flow(&centers, &velocities), CALM.speed).largest_trapped_air()
+        Motions::of(&flow(&centers, &velocities)).largest_trapped_air() / CALM.speed
     };
     let [together, apart] = [1.0, -1.0].map(trapped);
     assert!(together > 2.5 * apart && apart > 0.0, "{together} {apart}");
@@ -60,7 +60,7 @@ fn rigid_motion_traps_no_air() {
     let speed = Vec3::new(6.0, -5.0, 4.0);
     let motions = |velocity: &dyn Fn(Vec3) -> Vec3| {
         let velocities: Vec<Vec3> = centers.iter().map(|center| velocity(*center)).collect();
-        Motions::of(&flow(&centers, &velocities), CALM.speed).largest_trapped_air()
+        Motions::of(&flow(&centers, &velocities)).largest_trapped_air() / CALM.speed
     };
     assert_eq!(motions(&|_| speed), 0.0);
     // A rotation whose outermost particles are as fast as violent water
@@ -126,7 +126,7 @@ fn classes_follow_from_the_number_of_neighbours() {
     }
     assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
     let of_last = found.drops.iter().filter(|drop| drop.particle == last);
-    assert_eq!(of_last.count(), 48);
+    assert_eq!(of_last.count(), 160);
 }
 
 #[test]
@@ -158,27 +158,27 @@ fn drops_stay_with_their_particles() {
 #[test]
 fn small_drops_are_more_than_large_ones() {
     let all: Vec<_> =
-        (0..200).flat_map(|id| (0..48).map(move |k| candidate(id, k, false))).collect();
+        (0..200).flat_map(|id| (0..160).map(move |k| candidate(id, k, false))).collect();
     let part_above = |radius: f32, of: &dyn Fn(&drops::Candidate) -> f32| {
         all.iter().filter(|one| of(one) > radius).count() as f32 / all.len() as f32
     };
     // An exponential falls by e with each mean, a power by 2^(7/3) with each doubling
     let spray = |one: &drops::Candidate| one.spray_radius();
-    let ratio = part_above(0.03 + 0.06, &spray) / part_above(0.03 + 0.12, &spray);
+    let ratio = part_above(0.012 + 0.028, &spray) / part_above(0.012 + 0.056, &spray);
     assert!((ratio / 2.718 - 1.0).abs() < 0.1, "{ratio}");
     let bubble = |one: &drops::Candidate| one.bubble_radius();
-    let ratio = part_above(0.1, &bubble) / part_above(0.2, &bubble);
+    let ratio = part_above(0.06, &bubble) / part_above(0.12, &bubble);
     assert!((ratio / 5.04 - 1.0).abs() < 0.2, "{ratio}");
     for one in &all {
-        assert!((0.03..=0.4).contains(&spray(one)) && (0.08..0.501).contains(&bubble(one)));
+        assert!((0.012..=0.2).contains(&spray(one)) && (0.045..0.2501).contains(&bubble(one)));
         assert!(one.offset.length() <= 2.2001);
     }
 }
 
 #[test]
 fn thresholds_are_spread_evenly() {
-    let all = (0..500).flat_map(|id| (0..48).map(move |number| threshold(id, number)));
-    let below = |limit: f32| all.clone().filter(|value| *value < limit).count() as f32 / 24_000.0;
+    let all = (0..500).flat_map(|id| (0..160).map(move |number| threshold(id, number)));
+    let below = |limit: f32| all.clone().filter(|value| *value < limit).count() as f32 / 80_000.0;
     for limit in [0.1, 0.5, 0.9] {
         assert!((below(limit) - limit).abs() < 0.01, "{limit}");
     }
@@ -195,27 +195,43 @@ fn hostile_flows_do_not_panic() {
     assert!(found.drops.iter().all(|drop| drop.offset.is_finite() && drop.radius > 0.0));
     let far: Vec<Vec3> = (0..3000_u16).map(|i| Vec3::splat(f32::from(i) * 1e30)).collect();
     for speed in [1e-40, 1.0, 1e38, 0.0, -1.0, f32::NAN] {
-        let settings = WhitewaterSettings { speed, amount: 2.0 };
+        let settings = WhitewaterSettings { speed, amount: 2.0, size: 1.0 };
         let found = Whitewater::of(flow(&far, &velocities), settings);
         assert!(found.drops.iter().all(|drop| drop.radius.is_finite()));
     }
     assert_eq!(Whitewater::of(flow(&[], &[]), CALM), Whitewater::default());
     // Without a speed there is nothing to compare with
-    let none = WhitewaterSettings { speed: f32::NAN, amount: 1.0 };
+    let none = WhitewaterSettings { speed: f32::NAN, amount: 1.0, size: 1.0 };
     assert_eq!(Whitewater::of(flow(&same, &velocities), none), Whitewater::default());
 }
 
 #[test]
 fn number_of_drops_is_limited() {
-    // 60 000 drops of gas would be more
-    let centers: Vec<Vec3> = (0..60_000_u32).map(|i| Vec3::new(i as f32 * 4.0, 0.0, 0.0)).collect();
+    // Each particle is spray
+    let centers: Vec<Vec3> = (0..500_u16).map(|i| 4.0 * f32::from(i) * Vec3::X).collect();
     let velocities = vec![20.0 * Vec3::X; centers.len()];
     let settings = WhitewaterSettings { amount: 2.0, ..CALM };
-    let found = Whitewater::of(flow(&centers, &velocities), settings);
-    let all = 60_000 * 96;
-    assert_eq!(found.drops.len() as u64 + found.left_out, all);
-    assert!(found.drops.len().abs_diff(MAX_DROPS) < MAX_DROPS / 100, "{}", found.drops.len());
-    assert_eq!(found.atomized.len(), centers.len());
+    let all = Whitewater::of(flow(&centers, &velocities), settings);
+    assert_eq!((all.drops.len(), all.left_out), (500 * 320, 0));
+    let some = Whitewater::at_most(40_000, flow(&centers, &velocities), settings);
+    assert_eq!(some.drops.len() as u64 + some.left_out, 500 * 320);
+    assert!(some.drops.len().abs_diff(40_000) < 1000, "{}", some.drops.len());
+    assert!(some.drops.iter().step_by(400).all(|drop| all.drops.contains(drop)));
+    assert_eq!(some.atomized, all.atomized);
+}
+
+#[test]
+fn drops_are_counted_as_they_are_made() {
+    let centers = block([12, 8, 8]);
+    let velocity = |center: &Vec3| if center.x < 5.75 { 6.0 * Vec3::X } else { -6.0 * Vec3::X };
+    let velocities: Vec<Vec3> = centers.iter().map(velocity).collect();
+    let speeds = [0.0, 8.0, 10.0, 40.0];
+    let made = speeds.map(|speed| {
+        let settings = WhitewaterSettings { speed, amount: 0.5, size: 1.0 };
+        Whitewater::of(flow(&centers, &velocities), settings).drops.len() as u64
+    });
+    assert_eq!(drop_counts(flow(&centers, &velocities), &speeds, 0.5), made);
+    assert!(made[0] == 0 && made[1] > made[2] && made[2] > made[3], "{made:?}");
 }
 
 #[test]
