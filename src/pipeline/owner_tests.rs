@@ -201,17 +201,17 @@ const SURFACES: [(&str, &str, Range<f32>); 11] = [
         "render.surface = \"smooth\"\nsurface.spray = true\nsurface.spray_style = \"spheres\"",
         0.0..2.5,
     ),
-    // Spray is up to 4.5 radii away, and foam is moved to the surface
+    // Drops are up to 4.5 radii away, and foam is moved by up to 2 to the surface; their own radii come on top
     (
         "smooth, soft whitewater",
         "render.surface = \"smooth\"\nsurface.whitewater = true\nsurface.whitewater_speed = 0.05",
-        0.0..5.5,
+        0.0..7.0,
     ),
     (
         "smooth, spheres of whitewater",
         "render.surface = \"smooth\"\nsurface.whitewater = true\nsurface.whitewater_speed = 0.05\n\
          surface.whitewater_size = 2\nsurface.spray_style = \"spheres\"",
-        0.0..5.5,
+        0.0..7.0,
     ),
     ("union, soft spray", "render.surface = \"union\"\nsurface.spray = true", 0.0..2.0),
     (

@@ -14,7 +14,7 @@ use crate::surface::whitewater::{Drop, DropClass, Flow, Whitewater, WhitewaterSe
 use crate::surface::{Shape, Side};
 
 /// Maximum distance by which foam is moved to the surface, in particle radii. Foam that is farther away stays in its place.
-const MAX_SHIFT: f32 = 3.0;
+const MAX_SHIFT: f32 = 2.0;
 
 /// The drops of a frame.
 #[derive(Debug, Default)]

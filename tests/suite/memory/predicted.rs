@@ -278,11 +278,11 @@ fn frames_of_spray_alone_are_predicted() {
 
 #[test]
 fn whitewater_is_predicted_from_the_survey() {
-    // Particles are far from each other and equally fast, so that most of them are spray
+    // Particles are far from each other and fast, so that all of them are spray
     let white = ["--look", "water", "--whitewater", "--radius", "0.002"];
-    let fewer = ["--set", "surface.whitewater_amount=0.2"];
-    let options = [&SMALL[..], &white, &fewer].concat();
-    compare_bound("vtk", |path| vtk(path, 20_000, true), &options);
+    let fast = ["--set", "surface.whitewater_speed=0.5", "--set", "surface.whitewater_amount=0.2"];
+    let options = [&SMALL[..], &white, &fast].concat();
+    compare_bound("vtk", |path| vtk(path, 10_000, true), &options);
 }
 
 #[test]
