@@ -13,7 +13,8 @@ use crate::ray::Ray;
 use crate::surface::whitewater::{Drop, DropClass, Flow, Whitewater, WhitewaterSettings};
 use crate::surface::{Shape, Side};
 
-/// Maximum distance by which foam is moved to the surface, in particle radii. Foam that is farther away stays in its place.
+/// Maximum distance by which foam is moved to the surface, in particle radii. Foam that is farther away stays in its
+/// place.
 const MAX_SHIFT: f32 = 2.0;
 
 /// The drops of a frame.
@@ -29,8 +30,8 @@ pub(super) struct FrameDrops {
 }
 
 impl FrameDrops {
-    /// Finds the drops of `frame`, and moves its particles that are nothing but spray behind the others. Also returns the
-    /// number of particles in front of them.
+    /// Finds the drops of `frame`, and moves its particles that are nothing but spray behind the others. Also returns
+    /// the number of particles in front of them.
     pub(super) fn find(
         setup: &Setup,
         frame: &mut DecodedFrame<'_>,
@@ -71,7 +72,8 @@ impl FrameDrops {
         (Self { drops, radius, ..Self::default() }, body)
     }
 
-    /// Puts the drops to their particles, which are in the middle of the exposure and move by `displacements`, if they do.
+    /// Puts the drops to their particles, which are in the middle of the exposure and move by `displacements`, if they
+    /// do.
     pub(super) fn place(&mut self, particles: &[Vec3], displacements: &[Vec3]) {
         let place = |drop: &Drop| particles[drop.particle as usize] + drop.offset;
         self.drops.par_iter().map(place).collect_into_vec(&mut self.centers);
@@ -102,8 +104,8 @@ impl FrameDrops {
         });
     }
 
-    /// Builds the tree of the drops in `trees`, and with motion blur the one that moves. Returns the particle of each drop,
-    /// too.
+    /// Builds the tree of the drops in `trees`, and with motion blur the one that moves. Returns the particle of each
+    /// drop, too.
     pub(super) fn build(
         self,
         trees: &mut TreeBuilder,

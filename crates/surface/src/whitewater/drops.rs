@@ -31,8 +31,8 @@ const SPRAY_RADII: [f32; 3] = [0.012, 0.04, 0.2];
 const BUBBLE_RADII: [f32; 2] = [0.045, 0.25];
 
 /// The number of bubbles of a radius in a breaking wave falls off with this power of it, above the scale at which
-/// turbulence breaks them up (Deane and Stokes 2002, "Scale dependence of bubble creation mechanisms in breaking waves",
-/// Nature 418). Smaller ones are invisible.
+/// turbulence breaks them up (Deane and Stokes 2002, "Scale dependence of bubble creation mechanisms in breaking
+/// waves", Nature 418). Smaller ones are invisible.
 const BUBBLE_POWER: f32 = 10.0 / 3.0;
 
 /// A drop before its class is known. Lengths are in radii of its particle.
@@ -59,8 +59,8 @@ pub(super) fn candidate(id: u32, number: u32, is_atomized: bool) -> Candidate {
 }
 
 impl Candidate {
-    /// Its radius as a drop of water: sizes are distributed exponentially (Marshall and Palmer 1948, "The distribution of
-    /// raindrops with size"), between the least and the greatest.
+    /// Its radius as a drop of water: sizes are distributed exponentially (Marshall and Palmer 1948, "The distribution
+    /// of raindrops with size"), between the least and the greatest.
     pub(super) fn spray_radius(&self) -> f32 {
         let [least, mean, greatest] = SPRAY_RADII;
         let scale = mean - least;

@@ -1,11 +1,11 @@
 //! Whitewater: where a flow mixes with air, and the spray, foam and bubbles there.
 //!
-//! It follows Ihmsen, Akinci, Akinci and Teschner 2012, "Unified spray, foam and air bubbles for particle-based fluids":
-//! potentials for trapped air and for wave crests, each times one for kinetic energy ([`potential`], section 2 of the
-//! paper), and classes by the number of neighbours (section 3). The paper moves its diffuse particles from step to step,
-//! and lets them fade by age. Here, each frame stands alone: whether a drop exists follows from the potential of its
-//! particle and a hash of the particle's id, so that drops stay with their particles and do not flicker, and vanish where
-//! the water calms down.
+//! It follows Ihmsen, Akinci, Akinci and Teschner 2012, "Unified spray, foam and air bubbles for particle-based
+//! fluids": potentials for trapped air and for wave crests, each times one for kinetic energy ([`potential`], section
+//! 2 of the paper), and classes by the number of neighbours (section 3). The paper moves its diffuse particles from
+//! step to step, and lets them fade by age. Here, each frame stands alone: whether a drop exists follows from the
+//! potential of its particle and a hash of the particle's id, so that drops stay with their particles and do not
+//! flicker, and vanish where the water calms down.
 //!
 //! Sizes have the spectra of measurements ([`drops`]).
 
@@ -157,9 +157,9 @@ pub fn drop_counts(flow: Flow<'_>, speeds: &[f32], amount: f32) -> Vec<u64> {
     speeds.iter().map(count).collect()
 }
 
-/// Speed of violent water in a job whose fastest particles have this `speed`, and whose scene has this `height`. If all of
-/// the water is slow for water of this height, none of it is violent. The height is taken to be in metres, and the speed in
-/// metres per second; in shorter units of length, only the speed counts.
+/// Speed of violent water in a job whose fastest particles have this `speed`, and whose scene has this `height`. If
+/// all of the water is slow for water of this height, none of it is violent. The height is taken to be in metres, and
+/// the speed in metres per second; in shorter units of length, only the speed counts.
 #[must_use]
 pub fn violent_speed(speed: f32, height: f32) -> f32 {
     speed.max(LEAST_OF_FALL * (2.0 * GRAVITY * height.max(0.0)).sqrt())

@@ -12,19 +12,20 @@ use crate::field::bins::Bins;
 /// Support of the kernel in particle radii. Particles at rest are two radii apart.
 pub(super) const REACH: f32 = 4.0;
 
-/// Sum of the kernel `1 - distance / support` over the neighbours of a particle in water at rest: its integral, `PI / 3`
-/// times the third power of the support, divided by the volume of a particle, 8.
+/// Sum of the kernel `1 - distance / support` over the neighbours of a particle in water at rest: its integral, `PI /
+/// 3` times the third power of the support, divided by the volume of a particle, 8.
 pub(super) const SUM_AT_REST: f32 = PI / 3.0 * REACH * REACH * REACH / 8.0;
 
-/// Thresholds between which a potential rises from 0 to 1; of trapped air, crests and energy. Tuned on dam breaks of 10 000
-/// and of 200 000 particles.
+/// Thresholds between which a potential rises from 0 to 1; of trapped air, crests and energy. Tuned on dam breaks of
+/// 10 000 and of 200 000 particles.
 const TRAPPED_AIR: [f32; 2] = [0.06, 0.3];
 /// See [`TRAPPED_AIR`].
 const CREST: [f32; 2] = [0.06, 0.25];
 /// See [`TRAPPED_AIR`]. The energy is the square of the speed.
 const ENERGY: [f32; 2] = [0.04, 0.5];
 
-/// The same for particles that are nothing but spray: drops that leave the water break up at once, unless they are slow.
+/// The same for particles that are nothing but spray: drops that leave the water break up at once, unless they are
+/// slow.
 const ATOMIZING: [f32; 2] = [0.01, 0.1];
 
 /// Particles with at most this many within the support, themselves included, may be nothing but spray: the corner of a
@@ -37,15 +38,16 @@ const AT_SURFACE: f32 = 0.25;
 /// The least cosine between velocity and normal at a crest (section 2.2 of the paper).
 const FORWARD: f32 = 0.6;
 
-/// Maximum number of particles that are looked at for one: water at rest has 216 in the bins around it. It bounds the work
-/// if many particles are in one place.
+/// Maximum number of particles that are looked at for one: water at rest has 216 in the bins around it. It bounds the
+/// work if many particles are in one place.
 const MAX_VISITS: usize = 4096;
 
-/// Speeds from here on are not those of water, and count as zero, so that no square is infinite; scene units per unit of
-/// time.
+/// Speeds from here on are not those of water, and count as zero, so that no square is infinite; scene units per unit
+/// of time.
 const MAX_SPEED: f32 = 1e15;
 
-/// Calls `each` with the place in `bins`, the offset to `point` and the distance of particles within the size of the bins.
+/// Calls `each` with the place in `bins`, the offset to `point` and the distance of particles within the size of the
+/// bins.
 pub(super) fn each_neighbour(bins: &Bins, point: Vec3, mut each: impl FnMut(usize, Vec3, f32)) {
     let [x, y, z] = bins.cell_of(point);
     let limit = bins.size() * bins.size();
@@ -177,8 +179,8 @@ impl Motions {
         (energy * (air + crest).min(1.0), false)
     }
 
-    /// The curvature of the surface at `place` if it is convex and moves forward, relative to the sum at rest (equations 3
-    /// to 6 of the paper); 0 elsewhere.
+    /// The curvature of the surface at `place` if it is convex and moves forward, relative to the sum at rest
+    /// (equations 3 to 6 of the paper); 0 elsewhere.
     fn crest_at(&self, place: usize, velocity: Vec3) -> f32 {
         let outward = self.motions[place].around.outward;
         let normal = outward.normalize_or_zero();
