@@ -7,7 +7,7 @@
 //! potential of its particle and a hash of the particle's id, so that drops stay with their particles and do not
 //! flicker, and vanish where the water calms down.
 //!
-//! Sizes have the spectra of measurements ([`drops`]).
+//! Sizes have the spectra of measurements (`drops.rs`).
 
 use glam::Vec3;
 use rayon::prelude::*;

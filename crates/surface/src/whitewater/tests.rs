@@ -165,7 +165,7 @@ fn small_drops_are_more_than_large_ones() {
     // An exponential falls by e with each mean, a power by 2^(7/3) with each doubling
     let spray = |one: &drops::Candidate| one.spray_radius();
     let ratio = part_above(0.012 + 0.028, &spray) / part_above(0.012 + 0.056, &spray);
-    assert!((ratio / 2.718 - 1.0).abs() < 0.1, "{ratio}");
+    assert!((ratio / std::f32::consts::E - 1.0).abs() < 0.1, "{ratio}");
     let bubble = |one: &drops::Candidate| one.bubble_radius();
     let ratio = part_above(0.06, &bubble) / part_above(0.12, &bubble);
     assert!((ratio / 5.04 - 1.0).abs() < 0.2, "{ratio}");
