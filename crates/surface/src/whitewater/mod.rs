@@ -1,7 +1,7 @@
 //! Whitewater: where a flow mixes with air, and the spray, foam and bubbles there.
 //!
 //! It follows Ihmsen, Akinci, Akinci and Teschner 2012, "Unified spray, foam and air bubbles for particle-based
-//! fluids": potentials for trapped air and for wave crests, each times one for kinetic energy ([`potential`], section
+//! fluids": potentials for trapped air and for wave crests, each times one for kinetic energy (`potential.rs`, section
 //! 2 of the paper), and classes by the number of neighbours (section 3). The paper moves its diffuse particles from
 //! step to step, and lets them fade by age. Here, each frame stands alone: whether a drop exists follows from the
 //! potential of its particle and a hash of the particle's id, so that drops stay with their particles and do not
