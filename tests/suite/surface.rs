@@ -56,7 +56,7 @@ fn whitewater_is_where_water_is_violent() {
         let large = ["--set", "surface.whitewater_size=3"];
         let common = [&["render", "in", "-o", &pattern][..], &dark, &large].concat();
         shop.run(&[&common[..], &SMALL, &WATER, options].concat()).expect(0);
-        [1, 8].map(|frame| white_pixels(&shop.join(&format!("{out}/f.{frame:04}.exr"))))
+        [1, 8].map(|frame| white_pixels(&shop.join(format!("{out}/f.{frame:04}.exr"))))
     };
     let [calm, violent] = render("white", &["--whitewater"]);
     assert!(calm.0 * 50 <= calm.1, "{calm:?}");
