@@ -43,6 +43,7 @@ mod select;
 mod shutter;
 mod styles;
 mod surface;
+mod whitewater;
 
 pub use camera::check_views;
 pub use environment::{EnvironmentMap, KeptEnvironment};
@@ -197,7 +198,7 @@ fn setup_on(
         view: placed.view,
         scene,
         things: Things { meshes, cell, arrows, trails },
-        surface: manifest.surface,
+        surface: whitewater::with_speed(manifest, survey, extent.up)?,
         renderer: manifest.render.device.renderer(),
         step: channels::frame_step(&render.channels, &manifest.output, survey)?,
         render,

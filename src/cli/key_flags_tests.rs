@@ -33,7 +33,7 @@ const LISTS: [&str; 12] = [
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 70] = [
+const FLAGS: [(&str, &str); 71] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -90,6 +90,7 @@ const FLAGS: [(&str, &str); 70] = [
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--surface smooth --exact-surface", "surface.exact = true"),
     ("--surface smooth --spray", "surface.spray = true"),
+    ("--surface smooth --whitewater", "surface.whitewater = true"),
     ("--no-mmap", "input.mmap = false"),
     ("--follow-links", "input.follow_links = true"),
     ("--mesh-points", "input.mesh_points = true"),

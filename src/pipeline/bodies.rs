@@ -87,6 +87,14 @@ pub(super) fn radius_of(radius: &Radius) -> SphereRadius<'_> {
     }
 }
 
+/// The radius that a body of particles with these radii has.
+pub(super) fn common_radius(radius: &Radius) -> f32 {
+    match radius {
+        Radius::Common(radius) => *radius,
+        Radius::PerParticle(radii) => median_radius(radii, &mut Vec::new()),
+    }
+}
+
 /// The median of `radii`, because the field needs a common radius.
 fn median_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
     let mut sorted = radii.to_vec();

@@ -157,7 +157,7 @@ fn opacities_of(
     Ok(values_of(setup, (frame, range), number, radius, &value))
 }
 
-/// The velocities, if channels or motion blur need them.
+/// The velocities, if channels, motion blur or whitewater need them.
 fn velocities_of(
     setup: &Setup,
     frame: &SharedFrame<'_>,
@@ -165,7 +165,8 @@ fn velocities_of(
 ) -> Result<Option<Vec<Vec3>>, LoadError> {
     let shutter = setup.picture.view.shutter.as_ref();
     let is_moved = shutter.is_some_and(|shutter| shutter.has_velocities);
-    let velocities = if setup.picture.render.channels.needs_velocities() || is_moved {
+    let is_mixed = setup.picture.surface.whitewater;
+    let velocities = if setup.picture.render.channels.needs_velocities() || is_moved || is_mixed {
         velocity_of(&frame.attributes).map(vectors)
     } else {
         None
@@ -174,6 +175,10 @@ fn velocities_of(
         let has = frame.attributes.iter().map(|a| a.name.as_str());
         let purpose = "motion blur, which camera.shutter = 0 turns off";
         return Err(missing("velocity", purpose, file, has));
+    }
+    if is_mixed && velocities.is_none() && !frame.is_empty() {
+        let has = frame.attributes.iter().map(|a| a.name.as_str());
+        return Err(missing("velocity", "surface.whitewater", file, has));
     }
     Ok(velocities)
 }

@@ -52,6 +52,7 @@ mod trace;
 mod trails;
 #[cfg(feature = "gpu")]
 mod vulkan;
+mod whitewater;
 mod work;
 
 pub(crate) use bonds::covalent_lengths;

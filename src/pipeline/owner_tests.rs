@@ -185,7 +185,7 @@ fn check(particles: &Particles, film: &Film, distances: &Range<f32>, name: &str)
 }
 
 /// What draws the particles, and how far its points are from their centres, in radii.
-const SURFACES: [(&str, &str, Range<f32>); 9] = [
+const SURFACES: [(&str, &str, Range<f32>); 11] = [
     ("spheres", "", 0.99..1.01),
     (
         "cut spheres",
@@ -201,6 +201,18 @@ const SURFACES: [(&str, &str, Range<f32>); 9] = [
         "render.surface = \"smooth\"\nsurface.spray = true\nsurface.spray_style = \"spheres\"",
         0.0..2.5,
     ),
+    // Drops are up to 4.5 radii away, and foam is moved by up to 2 to the surface; their own radii come on top
+    (
+        "smooth, soft whitewater",
+        "render.surface = \"smooth\"\nsurface.whitewater = true\nsurface.whitewater_speed = 0.05",
+        0.0..7.0,
+    ),
+    (
+        "smooth, spheres of whitewater",
+        "render.surface = \"smooth\"\nsurface.whitewater = true\nsurface.whitewater_speed = 0.05\n\
+         surface.whitewater_size = 2\nsurface.spray_style = \"spheres\"",
+        0.0..7.0,
+    ),
     ("union, soft spray", "render.surface = \"union\"\nsurface.spray = true", 0.0..2.0),
     (
         "union, spheres of spray",
@@ -209,7 +221,7 @@ const SURFACES: [(&str, &str, Range<f32>); 9] = [
     ),
 ];
 
-// Renders 54 images: nine surfaces from two sources, as a whole, selected and moving.
+// Renders 66 images: eleven surfaces from two sources, as a whole, selected and moving.
 #[test]
 fn each_pixel_has_the_values_of_the_particle_that_it_shows() {
     let particles = Particles::new();

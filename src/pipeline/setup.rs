@@ -420,9 +420,10 @@ impl Picture {
         self.scene.camera.eyes()
     }
 
-    /// Whether ids of particles are needed: for channels, or for the sizes of soft drops.
+    /// Whether ids of particles are needed: for channels, or for the places and sizes of drops.
     pub(super) fn needs_ids(&self) -> bool {
-        self.render.channels.needs_ids() || self.scene.is_spray_soft()
+        let has_drops = self.scene.is_spray_soft() || self.surface.whitewater;
+        self.render.channels.needs_ids() || has_drops
     }
 }
 

@@ -49,7 +49,7 @@ struct StyleSpheres {
     tree: TreeBuilder,
     /// The same, with motion blur.
     moving: Option<MovingTree>,
-    owners: SphereOwners,
+    owners: SphereOwners<'static>,
 }
 
 /// The body of a style.

@@ -15,6 +15,7 @@ use super::motion::expose;
 use super::rods::FrameRods;
 use super::setup::Setup;
 use super::styled::StyleSurfaces;
+use super::whitewater::FrameDrops;
 use crate::accel::moving::MovingTree;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
@@ -43,6 +44,8 @@ pub(super) struct SurfaceBuilder {
     body: u32,
     /// Number of drops of each particle of the spray.
     drops_per_particle: u32,
+    /// The particle of each drop of whitewater; empty for spray.
+    owners: Vec<u32>,
     /// A smooth surface, for each slice of the exposure.
     smooth: Vec<SmoothGrid>,
     /// Trees of a union, for each slice of the exposure; empty without motion blur.
@@ -79,6 +82,8 @@ impl SurfaceBuilder {
         if has_spray {
             self.find_spray(setup, frame, trees);
         }
+        let whitewater = setup.picture.surface.whitewater;
+        let mut drops = whitewater.then(|| self.find_whitewater(setup, frame, &mut notes));
         if let Some(shutter) = setup.picture.view.shutter {
             self.displacements = expose(setup, shutter, frame);
         }
@@ -87,6 +92,10 @@ impl SurfaceBuilder {
             report.bytes.surface = built.position_bytes + built.structure_bytes;
             report.bytes.surface += self.moving[1].byte_len();
         }
+        if let Some(drops) = &mut drops {
+            drops.place(&frame.centers, &self.displacements);
+            self.leave_body(frame);
+        }
         report.bytes.surface += style_bytes;
         // Build a surface that is not made of single spheres
         let kind = setup.picture.surface.kind;
@@ -94,6 +103,10 @@ impl SurfaceBuilder {
             let made = self.build_smooth(setup, frame, &mut notes)?;
             report.bytes.surface += made.bytes;
             report.bytes.surface_peak = report.bytes.surface + made.peak_bytes - made.bytes;
+        }
+        if let Some(drops) = drops {
+            let built = self.build_whitewater(drops);
+            report.bytes.surface += built;
         }
         let has_unions = kind == SurfaceKind::Union && setup.has_motion();
         if has_unions {
@@ -249,7 +262,13 @@ impl SurfaceBuilder {
                 .collect();
             self.moving[1].build(&self.spray.tree().view(), &of_drops);
         }
-        // Leave the body in the frame
+        self.leave_body(frame);
+        built
+    }
+
+    /// Leaves only the body in `frame`, apart from what belongs to its shading.
+    fn leave_body(&mut self, frame: &mut DecodedFrame<'_>) {
+        let body = frame.centers.len().min(self.body as usize);
         match &mut frame.centers {
             Cow::Borrowed(all) => *all = &all[..body],
             Cow::Owned(all) => all.truncate(body),
@@ -258,7 +277,29 @@ impl SurfaceBuilder {
         if let Radius::PerParticle(radii) = &mut frame.radius {
             radii.truncate(body);
         }
-        built
+    }
+
+    /// Finds the whitewater of `frame`, and moves the particles that are nothing but spray behind those of the body.
+    fn find_whitewater(
+        &mut self,
+        setup: &Setup,
+        frame: &mut DecodedFrame<'_>,
+        notes: &mut Vec<String>,
+    ) -> FrameDrops {
+        let (drops, body) = FrameDrops::find(setup, frame, notes);
+        self.body = u32::try_from(body).unwrap_or(u32::MAX);
+        drops
+    }
+
+    /// Builds the tree of `drops` on the smooth surface, and returns its memory in bytes.
+    fn build_whitewater(&mut self, mut drops: FrameDrops) -> u64 {
+        if let Some(grid) = self.smooth.get(self.smooth.len() / 2) {
+            drops.float(&grid.surface());
+        }
+        let (built, owners) = drops.build(&mut self.spray, &mut self.moving[1]);
+        self.owners = owners;
+        let owners = size_of_val(&self.owners[..]) as u64;
+        built.position_bytes + built.structure_bytes + self.moving[1].byte_len() + owners
     }
 
     /// Renders the surface that `setup` requires over the spheres of `tree`, and the shapes `others`, to `film`.
@@ -277,8 +318,11 @@ impl SurfaceBuilder {
         stop: &dyn Stop,
     ) -> Result<RayCounts, RenderError> {
         let body = self.body(setup, tree);
-        let owners =
-            SphereOwners::new(MaterialId::SPRAY, self.body).with_spheres(self.drops_per_particle);
+        let owners = if self.owners.is_empty() {
+            SphereOwners::new(MaterialId::SPRAY, self.body).with_spheres(self.drops_per_particle)
+        } else {
+            SphereOwners::listed(MaterialId::SPRAY, &self.owners)
+        };
         let spray: Box<dyn Shape> = if setup.has_motion() {
             Box::new(MovingSpheres::new(&self.moving[1]).of(owners))
         } else {

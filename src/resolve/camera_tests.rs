@@ -37,6 +37,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         angstrom: 1.0,
         time_unit: None,
         weight: None,
+        speed: None,
         surfaces: Vec::new(),
     }
 }

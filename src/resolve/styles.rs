@@ -172,7 +172,7 @@ impl Looks<'_> {
             None => StyleForm::Nothing,
             Some(kind) => {
                 let usual = self.manifest.surface;
-                StyleForm::of(SurfaceSettings { kind, spray: false, ..usual })
+                StyleForm::of(SurfaceSettings { kind, spray: false, whitewater: false, ..usual })
             }
         }
     }

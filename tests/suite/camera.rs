@@ -310,7 +310,7 @@ fn focus_follows_a_particle_through_the_frames() {
     assert!(errors.contains("no particle has the id 3"), "{errors}");
 }
 
-// Starts the program 14 times: each surface sharp, blurred, on more threads and at another time; and spray.
+// Starts the program 16 times: each surface sharp, blurred, on more threads and at another time; spray and whitewater.
 #[test]
 fn motion_blur_moves_particles_with_their_velocities() {
     let workshop = Workshop::new();
@@ -340,6 +340,9 @@ fn motion_blur_moves_particles_with_their_velocities() {
     let spray = ["--surface", "smooth", "--spray"];
     let moving = render("spray-blurred", &[&blur[..], &spray].concat());
     assert_ne!(moving, render("spray-sharp", &spray));
+    let white = ["--surface", "smooth", "--whitewater"];
+    let moving = render("white-blurred", &[&blur[..], &white].concat());
+    assert_ne!(moving, render("white-sharp", &white));
 }
 
 #[test]

@@ -58,6 +58,10 @@ pub(super) const RULES: &[Rule] = rules! {
         "is for the smooth surface alone; set render.surface to \"smooth\", or leave it out (spheres are always exact)";
     "render.surface" MissingOr["spheres"] => "surface.spray" MissingOr["false"]:
         "lies beside one body; set render.surface to \"union\" or \"smooth\", or leave it out";
+    "render.surface" MissingOrNot["smooth"] => "surface.whitewater" MissingOr["false"]:
+        "lies on a smooth surface; set render.surface to \"smooth\", or leave it out";
+    "surface.whitewater" Is["true"] => "surface.spray" MissingOr["false"]:
+        "is given, but whitewater has spray of its own; leave one of both out";
     "render.surface" MissingOr["spheres"], "surface.normals" Is["field", "pca"] => "camera.shutter" MissingOr["0"]:
         "motion blur of spheres needs surface.normals = \"sphere\"";
     "render.surface" IsNot["spheres"] => "material.part" Missing:
@@ -340,6 +344,15 @@ mod tests {
                 "surface.exact: is for the smooth",
             ),
             ("surface.spray = true", "surface.spray: lies beside one body"),
+            ("surface.whitewater = true", "surface.whitewater: lies on a smooth surface"),
+            (
+                "render.surface = \"union\"\nsurface.whitewater = true",
+                "surface.whitewater: lies on a smooth surface; set render.surface to \"smooth\"",
+            ),
+            (
+                "render.surface = \"smooth\"\nsurface.whitewater = true\nsurface.spray = true",
+                "surface.spray: is given, but whitewater has spray of its own",
+            ),
             (
                 "render.surface = \"smooth\"\nsurface.normals = \"pca\"",
                 "surface.normals: a smooth surface has the normals of its field",
@@ -368,6 +381,7 @@ mod tests {
             "surface.normals = \"pca\"",
             "render.surface = \"union\"\nsurface.normals = \"field\"\nsurface.spray = true",
             "render.surface = \"smooth\"\nsurface.exact = true",
+            "render.surface = \"smooth\"\nsurface.whitewater = true\nsurface.spray = false",
             "render.integrator = \"whitted\"\nrender.ground = \"checker\"",
         ] {
             read(text).unwrap().check_rules().unwrap();

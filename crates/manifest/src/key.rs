@@ -11,8 +11,10 @@ pub(super) enum Affects {
     Bodies,
     /// Unions and smooth surfaces with path tracing.
     PathTracedBodies,
-    /// Spray with path tracing.
+    /// Spray or whitewater with path tracing.
     Spray,
+    /// Whitewater of smooth surfaces.
+    Whitewater,
     /// Spheres that reflect and refract.
     BranchingSpheres,
     /// The path integrator.
@@ -39,7 +41,10 @@ impl Affects {
             Self::PathTracedBodies => {
                 "Changes images of unions and smooth surfaces with `integrator = \"path\"`."
             }
-            Self::Spray => "Changes images of `integrator = \"path\"` with `spray = true`.",
+            Self::Spray => {
+                "Changes images of `integrator = \"path\"` with `spray = true` or `whitewater = true`."
+            }
+            Self::Whitewater => "Changes images with `whitewater = true`.",
             Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
             Self::PathTracing => "Changes images of `integrator = \"path\"`.",
             Self::Sky => "Changes images of `integrator = \"path\"` with a sky.",

@@ -450,12 +450,17 @@ impl Manifest {
         self.surface.kind != SurfaceKind::Spheres && self.integrator() == IntegratorKind::Path
     }
 
-    /// Whether foam and spray are path traced.
+    /// Whether foam, spray or whitewater is path traced.
     fn has_path_traced_spray(&self) -> bool {
-        self.surface.spray && self.has_path_traced_body()
+        (self.surface.spray || self.has_whitewater()) && self.has_path_traced_body()
     }
 
-    /// Whether foam and spray are drops that fade out.
+    /// Whether there is whitewater, which only smooth surfaces have.
+    pub fn has_whitewater(&self) -> bool {
+        self.surface.whitewater && self.surface.kind == SurfaceKind::Smooth
+    }
+
+    /// Whether foam, spray and whitewater are drops that fade out.
     pub fn draws_soft_spray(&self) -> bool {
         self.has_path_traced_spray() && self.surface.spray_style == SprayStyle::Soft
     }
@@ -469,6 +474,7 @@ impl Manifest {
             Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
             Affects::PathTracedBodies => self.has_path_traced_body(),
             Affects::Spray => self.has_path_traced_spray(),
+            Affects::Whitewater => self.has_whitewater(),
             Affects::BranchingSpheres => self.branches_at_spheres(),
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
             Affects::Sky => self.has_environment(EnvironmentKind::Sky),

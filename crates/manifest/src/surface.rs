@@ -17,6 +17,12 @@ const SMOOTHING_LENGTHS: [f32; 2] = [1.0, 8.0];
 /// Maximum threshold; the field is about 1 inside, and rarely higher.
 const MAX_THRESHOLD: f32 = 4.0;
 
+/// Maximum amount of whitewater: its drops cover everything long before.
+const MAX_AMOUNT: f32 = 8.0;
+
+/// Maximum factor on their radii, with which the largest are as large as particles.
+const MAX_SIZE: f32 = 4.0;
+
 named!(SurfaceKind: Spheres = "spheres", Union = "union", Smooth = "smooth");
 named!(SprayStyle: Soft = "soft", Spheres = "spheres");
 named!(NormalKind: Auto = "auto", Sphere = "sphere", Field = "field", Pca = "pca");
@@ -53,7 +59,24 @@ pub(super) fn all_keys(settings: &mut SurfaceSettings, keys: &mut Keys<'_>) {
         threshold => settings.threshold, above(0), to(MAX_THRESHOLD), affects(Affects::SmoothSurfaces);
         /// Particles with few neighbours become foam and spray outside the surface
         spray => settings.spray, affects(Affects::Bodies), flag("spray", "", "Look");
-        /// Foam and spray: soft (clusters of white drops that fade out) | spheres
+        /// Spray, foam and bubbles of a smooth surface where its flow mixes with air; needs velocities
+        ///
+        /// Spray is in the air, foam on the surface, bubbles below it. It includes the particles that `spray` draws, if
+        /// they are fast.
+        whitewater => settings.whitewater, affects(Affects::SmoothSurfaces), flag("whitewater", "", "Look");
+        /// Speed of violent water, to which the speeds in whitewater are relative, in the unit of the velocities
+        ///
+        /// auto: the speed of the fastest particles of the sequence, but at least two fifths of that of a fall over its
+        /// height in metres. A larger speed gives less whitewater.
+        whitewater_speed => settings.whitewater_speed, or("auto"), unit("a speed"), above(0), single(),
+            affects(Affects::Whitewater);
+        /// Factor on the number of drops of whitewater
+        whitewater_amount => settings.whitewater_amount, above(0), to(MAX_AMOUNT), affects(Affects::Whitewater);
+        /// Factor on the radii of the drops of whitewater, which are 0.012 to 0.25 particle radii
+        ///
+        /// In simulations with few particles, a half with four times the amount is a finer mist.
+        whitewater_size => settings.whitewater_size, above(0), to(MAX_SIZE), affects(Affects::Whitewater);
+        /// Foam, spray and whitewater: soft (clusters of white drops that fade out) | spheres
         ///
         /// whitted draws spheres only.
         spray_style => settings.spray_style, affects(Affects::Spray);

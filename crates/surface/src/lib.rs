@@ -8,7 +8,8 @@
 //! a particle that provides attributes, whatever shape it belongs to. A shape has a [`MaterialId`]. What a material looks
 //! like, and how light travels between shapes, the crate leaves to `spherule-tracer`.
 //!
-//! - Spheres: [`spheres`], [`union`](mod@union) of those that overlap, [`spray`], [`moving`] ones, [`cut`] ones.
+//! - Spheres: [`spheres`], [`union`](mod@union) of those that overlap, [`spray`], [`whitewater`],
+//!   [`moving`] ones, [`cut`] ones.
 //! - [`smooth`]: the isosurface of the [`field`](mod@field) of particles, on a sparse grid.
 //! - [`grains`]: ellipsoids, superquadrics, capsules, cylinders, cuboids and meshes with a place and orientation each.
 //! - [`mesh`], [`rods`] and the ground [`Plane`].
@@ -73,6 +74,7 @@ pub mod spheres;
 pub mod spray;
 mod transmittance;
 pub mod union;
+pub mod whitewater;
 
 pub use gradient::GradientNormals;
 pub use intersections::{Intersection, Intersections};

@@ -13,7 +13,7 @@ use spherule_tree::ray::{Ray, RayPacket};
 #[derive(Debug, Clone, Copy)]
 pub struct MovingSpheres<'a> {
     tree: &'a MovingTree,
-    owners: SphereOwners,
+    owners: SphereOwners<'a>,
     simd: Supported,
 }
 
@@ -25,7 +25,7 @@ impl<'a> MovingSpheres<'a> {
 
     /// Sets what the spheres belong to.
     #[must_use]
-    pub fn of(self, owners: SphereOwners) -> Self {
+    pub fn of(self, owners: SphereOwners<'a>) -> Self {
         Self { owners, ..self }
     }
 }

@@ -65,8 +65,17 @@ pub struct SurfaceSettings {
     pub threshold: f32,
     /// Draw particles with few neighbours as white drops that are not part of the surface.
     pub spray: bool,
-    /// How these are drawn.
+    /// How these, and whitewater, are drawn.
     pub spray_style: SprayStyle,
+    /// Draw spray, foam and bubbles where the flow mixes with air.
+    pub whitewater: bool,
+    /// Speed of violent water, to which the speeds of whitewater are relative, scene units per unit of time; None until it
+    /// is known.
+    pub whitewater_speed: Option<f32>,
+    /// Factor on the number of drops of whitewater.
+    pub whitewater_amount: f32,
+    /// Factor on the radii of these drops.
+    pub whitewater_size: f32,
 }
 
 impl SurfaceSettings {
@@ -81,6 +90,10 @@ impl SurfaceSettings {
         threshold: 0.6,
         spray: false,
         spray_style: SprayStyle::Soft,
+        whitewater: false,
+        whitewater_speed: None,
+        whitewater_amount: 1.0,
+        whitewater_size: 1.0,
     };
 
     /// Support of the SPH kernel in particle radii.

@@ -14,6 +14,9 @@ pub struct SurfaceSize {
     pub particles: u64,
     /// Number of particles that are spray.
     pub spray: u64,
+    /// Number of drops of whitewater.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub drops: u64,
     /// The grid of a smooth surface of the others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<GridSize>,
@@ -27,6 +30,7 @@ impl SurfaceSize {
         Self {
             particles: centers.len() as u64,
             spray: (centers.len() - body.len()) as u64,
+            drops: 0,
             grid: (settings.kind == SurfaceKind::Smooth)
                 .then(|| GridSize::of(body, radius, settings)),
         }
@@ -42,7 +46,7 @@ impl SurfaceSize {
         };
         let spray = part(self.spray);
         let grid = self.grid.map(|grid| grid.scaled(part(grid.particles), edge));
-        Self { particles, spray, grid }
+        Self { particles, spray, drops: part(self.drops), grid }
     }
 
     /// The larger counts of both.
@@ -52,9 +56,15 @@ impl SurfaceSize {
         Self {
             particles: self.particles.max(other.particles),
             spray: self.spray.max(other.spray),
+            drops: self.drops.max(other.drops),
             grid: if building(&other) > building(&self) { other.grid } else { self.grid },
         }
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+const fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 #[cfg(test)]
@@ -93,8 +103,9 @@ mod tests {
 
     #[test]
     fn scaled_size_has_the_same_part_of_spray() {
-        let size = SurfaceSize { particles: 100, spray: 25, grid: None };
-        assert_eq!(size.scaled(400, 1.0), SurfaceSize { particles: 400, spray: 100, grid: None });
+        let size = SurfaceSize { particles: 100, spray: 25, drops: 50, grid: None };
+        let larger = SurfaceSize { particles: 400, spray: 100, drops: 200, grid: None };
+        assert_eq!(size.scaled(400, 1.0), larger);
         assert_eq!(SurfaceSize::default().scaled(7, 1.0).spray, 0);
     }
 }

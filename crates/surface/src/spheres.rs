@@ -29,7 +29,7 @@ const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 pub struct SphereSurface<'a> {
     tree: TreeView<'a>,
     normals: ShadingNormals,
-    owners: SphereOwners,
+    owners: SphereOwners<'a>,
     simd: Supported,
 }
 
@@ -52,7 +52,7 @@ impl<'a> SphereSurface<'a> {
 
     /// Sets what the spheres belong to.
     #[must_use]
-    pub fn of(self, owners: SphereOwners) -> Self {
+    pub fn of(self, owners: SphereOwners<'a>) -> Self {
         Self { owners, ..self }
     }
 }

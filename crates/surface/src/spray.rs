@@ -79,25 +79,33 @@ pub struct SoftDrop {
 #[must_use]
 #[inline]
 pub fn soft_drop(id: u32, number: u32) -> SoftDrop {
-    let random = |dimension: u32| {
-        // Hash by Wellons, "lowbias32", 2018
-        let mut bits =
-            id.wrapping_mul(0x9e37_79b9) ^ (4 * number + dimension).wrapping_mul(0x85eb_ca6b);
-        for _ in 0..2 {
-            bits = (bits ^ bits >> 16).wrapping_mul(0x7feb_352d);
-            bits = (bits ^ bits >> 15).wrapping_mul(0x846c_a68b);
-            bits ^= bits >> 16;
-        }
-        (bits >> 8) as f32 / (1 << 24) as f32
-    };
+    let random = |dimension: u32| random(id, 4 * number + dimension);
     let [least, greatest] = SOFT_RADII;
     let size = random(3);
-    // Map a cube to a ball, and move the points towards its middle
-    let [x, y, z] = [0, 1, 2].map(|axis| 2.0 * random(axis) - 1.0);
-    let corner = Vec3::new(x, y, z);
-    let offset = corner * (SOFT_SPREAD * corner.abs().max_element() / corner.length().max(1e-6));
+    // Move the points of a ball towards its middle
+    let offset = point_in_ball([0, 1, 2].map(random), SOFT_SPREAD);
     let reach = offset.length() / SOFT_SPREAD;
     SoftDrop { offset: reach * offset, radius: least + (greatest - least) * size * size }
+}
+
+/// The random number `dimension` of the particle `id`, from 0 to below 1: the same in all frames.
+#[inline]
+pub(super) fn random(id: u32, dimension: u32) -> f32 {
+    // Hash by Wellons, "lowbias32", 2018
+    let mut bits = id.wrapping_mul(0x9e37_79b9) ^ dimension.wrapping_mul(0x85eb_ca6b);
+    for _ in 0..2 {
+        bits = (bits ^ bits >> 16).wrapping_mul(0x7feb_352d);
+        bits = (bits ^ bits >> 15).wrapping_mul(0x846c_a68b);
+        bits ^= bits >> 16;
+    }
+    (bits >> 8) as f32 / (1 << 24) as f32
+}
+
+/// The point of a ball of `radius` around the origin that three numbers from 0 to 1 lead to, by a map from a cube.
+#[inline]
+pub(super) fn point_in_ball(u: [f32; 3], radius: f32) -> Vec3 {
+    let corner = Vec3::from(u.map(|u| 2.0 * u - 1.0));
+    corner * (radius * corner.abs().max_element() / corner.length().max(1e-6))
 }
 
 #[cfg(test)]

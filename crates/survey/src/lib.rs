@@ -80,7 +80,7 @@ pub use tank::Tank;
 use totals::Totals;
 pub use walls::{WallSign, WallValues};
 use weight::has_surface;
-pub use weight::{FrameWeight, SurfaceQuestion, SurfaceWeight};
+pub use weight::{DropCount, FrameWeight, SurfaceQuestion, SurfaceWeight};
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
@@ -174,6 +174,10 @@ pub struct Survey {
     /// Size of the heaviest sampled frame. Jobs of the first versions lack it.
     #[serde(default)]
     pub weight: Option<FrameWeight>,
+    /// Speed of the fastest particles: the 99th percentile of the frame where it is the highest. Jobs of earlier versions
+    /// lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f32>,
     /// The surfaces of some of the sampled frames, if they were requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<SurfaceWeight>,

@@ -47,6 +47,7 @@ pub(super) struct Totals {
     labels: Labels,
     points: Vec<DVec3>,
     velocity: Option<String>,
+    speed: Option<f32>,
     rgb: Option<RgbAttribute>,
     attributes: BTreeMap<String, usize>,
     most_particles: usize,
@@ -96,6 +97,7 @@ impl Totals {
             labels: Labels::new(),
             points: Vec::new(),
             velocity: None,
+            speed: None,
             rgb: None,
             attributes: BTreeMap::new(),
             most_particles: 0,
@@ -121,6 +123,7 @@ impl Totals {
         self.add_extent(&sample, up, is_framed);
         let FrameSample { particles: raw, count, spacing, mut weight, .. } = sample;
         self.find_velocity_and_colors(&raw, question.color);
+        self.add_speed(&raw);
         let origin =
             self.bounds.map_or(DVec3::ZERO, |bounds| choose_origin(bounds.outer.0, bounds.outer.1));
         let groups = question.styles.and_then(|styles| groups_of(styles, &raw, up));
@@ -213,6 +216,14 @@ impl Totals {
                 ColorQuestion::Speed(_) => RgbAttribute::of(&raw.attributes, None),
                 ColorQuestion::Value(name, _) => RgbAttribute::of(&raw.attributes, Some(name)),
             };
+        }
+    }
+
+    /// Adds the speed of the fastest particles of a frame.
+    fn add_speed(&mut self, raw: &RawParticles) {
+        if let Some(velocity) = velocity_of(&raw.attributes) {
+            let speed = robust_largest(velocity.count(), |i| narrow(velocity.magnitude(i)));
+            self.speed = Some(self.speed.unwrap_or(0.0).max(speed));
         }
     }
 
@@ -360,6 +371,7 @@ impl Totals {
             angstrom: 1.0,
             time_unit: None,
             weight,
+            speed: self.speed,
             surfaces: self.surfaces,
         }
     }

@@ -106,6 +106,8 @@ fn surface_at(setup: &Setup, index: usize, particles: u64) -> Option<SurfaceSize
     let surfaces = || setup.run.surfaces.iter();
     let before = surfaces().rfind(|surface| surface.index <= index);
     let after = surfaces().find(|surface| surface.index >= index);
-    let scaled = |surface: &SurfaceWeight| surface.scaled(particles, picture.surface.voxel, radius);
+    let (voxel, speed) = (picture.surface.voxel, picture.surface.whitewater_speed);
+    let speed = speed.filter(|_| picture.surface.whitewater);
+    let scaled = |surface: &SurfaceWeight| surface.scaled(particles, voxel, radius, speed);
     before.into_iter().chain(after).map(scaled).reduce(SurfaceSize::larger)
 }

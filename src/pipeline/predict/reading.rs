@@ -139,7 +139,8 @@ impl MemoryModel<'_> {
         }
         let radii = if self.own_radii { 4 } else { 0 };
         // Velocities become displacements, and stay only for channels
-        let motion = if self.setup.has_motion() { 12 } else { 0 };
+        let has_velocities = self.setup.has_motion() || self.setup.picture.surface.whitewater;
+        let motion = if has_velocities { 12 } else { 0 };
         frame.particles * (12 + radii + motion) + self.shading(frame)
     }
 
@@ -158,6 +159,7 @@ impl MemoryModel<'_> {
         let picture = &self.setup.picture;
         let has_ids = self.has_ids
             || picture.surface.spray
+            || picture.surface.whitewater
             || !rules.selection.is_all()
             || rules.is_divided();
         let ids = picture.needs_ids() && has_ids;

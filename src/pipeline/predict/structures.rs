@@ -7,10 +7,14 @@ use crate::accel::{
 };
 use crate::surface::smooth::GridSize;
 use crate::surface::spray::{SOFT_DROP_BYTES, SOFT_DROPS};
+use crate::surface::whitewater::{DROP_BYTES, MAX_DROPS, PARTICLE_BYTES};
 use crate::surface::{SurfaceBytes, SurfaceKind};
 
 /// One in this many particles is assumed to be spray in a frame of which nothing is known.
 const PARTICLES_PER_DROP: u64 = 10;
+
+/// This many drops of whitewater are assumed for each particle of a frame of which nothing is known.
+const DROPS_PER_PARTICLE: u64 = 8;
 
 impl MemoryModel<'_> {
     /// The tree of a frame.
@@ -64,6 +68,31 @@ impl MemoryModel<'_> {
         }
     }
 
+    /// Number of drops of whitewater in a frame.
+    fn drop_count(&self, frame: &FrameSize) -> u64 {
+        let assumed = frame.particles.saturating_mul(DROPS_PER_PARTICLE);
+        frame.surface.map_or(assumed, |surface| surface.drops).min(MAX_DROPS as u64)
+    }
+
+    /// Memory of the list of drops of whitewater, which is there until their tree is built: with their places and, if they
+    /// move, displacements.
+    fn listed_drops(&self, frame: &FrameSize) -> u64 {
+        let displacement = if self.setup.has_motion() { 12 } else { 0 };
+        self.drop_count(frame) * (DROP_BYTES + 12 + displacement)
+    }
+
+    /// Memory of the whitewater of a frame. Its drops are listed before the surface is built, and its tree is built
+    /// afterwards, with a list of their radii.
+    fn whitewater(&self, frame: &FrameSize) -> SurfaceBytes {
+        let drops = self.drop_count(frame);
+        let tree = predicted_bytes(&BuildSettings::new(Structure::Lbvh), drops, true);
+        let moving = self.moving_tree(drops);
+        let kept = tree.tree + moving + 4 * drops;
+        let lists = self.listed_drops(frame) + 4 * drops;
+        let building = lists + kept + (tree.scratch + sorting_bytes(drops)).max(moving);
+        SurfaceBytes { building: building.max(frame.particles * PARTICLE_BYTES + lists), kept }
+    }
+
     /// Memory of a tree of moving spheres; none without motion blur.
     fn moving_tree(&self, particles: u64) -> u64 {
         if self.setup.has_motion() { MovingTree::predicted_bytes(particles) } else { 0 }
@@ -74,6 +103,14 @@ impl MemoryModel<'_> {
     pub(super) fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
         let spray = self.drops(frame);
         let body = self.body(frame);
+        if self.setup.picture.surface.whitewater {
+            // The body is built between the list of drops and their tree
+            let with_body = self.listed_drops(frame) + body.building;
+            return SurfaceBytes {
+                building: with_body.max(body.kept + spray.building),
+                kept: spray.kept + body.kept,
+            };
+        }
         // The body is built beside the spray
         SurfaceBytes {
             building: spray.building.max(spray.kept + body.building),
@@ -81,8 +118,11 @@ impl MemoryModel<'_> {
         }
     }
 
-    /// Memory of the spray of a frame.
+    /// Memory of the spray or the whitewater of a frame.
     pub(super) fn drops(&self, frame: &FrameSize) -> SurfaceBytes {
+        if self.setup.picture.surface.whitewater {
+            return self.whitewater(frame);
+        }
         if !self.setup.picture.surface.spray {
             return SurfaceBytes::default();
         }

@@ -56,6 +56,10 @@ fn contradictory_surface_options_are_rejected() {
             "--exact-surface: is for the smooth surface alone",
         ),
         (["--spray", "--surface=spheres"], "--spray: lies beside one body; set render.surface"),
+        (
+            ["--whitewater", "--surface=union"],
+            "--whitewater: lies on a smooth surface; set render.surface",
+        ),
         (["--smoothing", "1.5"], "--smoothing: expected a number from 0 to 1"),
     ] {
         not_rendered(&workshop, &options, &[expected]);

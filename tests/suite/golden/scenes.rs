@@ -65,6 +65,10 @@ const SPHERES: SurfaceSettings = SurfaceSettings {
     threshold: 0.6,
     spray: false,
     spray_style: spherule::surface::SprayStyle::Spheres,
+    whitewater: false,
+    whitewater_speed: None,
+    whitewater_amount: 1.0,
+    whitewater_size: 1.0,
 };
 
 /// Owned colours.

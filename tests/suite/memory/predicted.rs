@@ -16,7 +16,7 @@ use spherule_formats::convert::{BlockSettings, BlockSource, ParticleSource};
 use spherule_formats::{ParticleFrame, Positions, RawParticles, native, write};
 
 use super::{AWAY, answer, particles, vtk};
-use crate::harness::Workshop;
+use crate::harness::{Workshop, dam_break};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -274,6 +274,22 @@ fn frames_of_spray_alone_are_predicted() {
         let options = [&SMALL[..], &look, &spray].concat();
         compare_bound("npy", |path| block(path, 20_000), &options);
     }
+}
+
+// The grid of the smooth surface is that of all particles, also of those that are nothing but spray, so the bound is less
+// tight than others.
+#[test]
+fn whitewater_is_bounded_by_the_survey() {
+    let splash = |path: &Path| {
+        dam_break(path.parent().expect("a directory"), [9]);
+        fs::rename(path.with_file_name("f_9.bgeo"), path).expect("a frame");
+    };
+    // Many drops, so that they are a large part
+    let more = ["--look", "water", "--whitewater", "--radius", "0.02", "--set"];
+    let options = [&SMALL[..], &more, &["surface.whitewater_amount=8"]].concat();
+    let (predicted, measured) = peaks("bgeo", splash, &options);
+    let least = (1.0 - TOLERANCE.0) * measured - TOLERANCE.1;
+    assert!((least..=2.0 * measured).contains(&predicted), "{predicted}, measured {measured}");
 }
 
 #[test]

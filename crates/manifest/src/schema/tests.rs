@@ -16,7 +16,7 @@ input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5
 camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
 image = { width = "85mm", height = "6 cm", dpi = 600 }
 render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
-surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true, spray_style = "spheres" }
+surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true, spray_style = "spheres", whitewater = false, whitewater_speed = 3.5, whitewater_amount = 2, whitewater_size = 0.5 }
 select = { where = "x > 1 && !(speed <= 2)", ids = "1-5", every = 2, slab = { axis = "y", center = 0, thickness = 0.5 } }
 clip = [{ type = "plane", normal = "-x", offset = 2 }, { type = "plane", normal = [1, 2, 0], point = [1, 1, 1], mode = "cut" }, { type = "box", min = [0, 0, 0], max = [1, 1, 1], keep = "outside" }]
 material = { color = { attribute = "velocity.x", map = "red-blue_r", range = "1%-99.5%", scale = "symlog", threshold = 0.1, steps = 8, reverse = true }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
@@ -282,7 +282,7 @@ fn key_dependencies_agree() {
 }
 
 /// Settings that are valid alone or with one or two others.
-const SETTINGS: [[&str; 2]; 53] = [
+const SETTINGS: [[&str; 2]; 54] = [
     ["camera.mode", "\"auto\""],
     ["camera.mode", "\"fixed\""],
     ["camera.mode", "\"turntable\""],
@@ -322,6 +322,7 @@ const SETTINGS: [[&str; 2]; 53] = [
     ["surface.normals", "\"sphere\""],
     ["surface.exact", "true"],
     ["surface.spray", "true"],
+    ["surface.whitewater", "true"],
     ["material.type", "\"glass\""],
     ["material.type", "\"matte\""],
     ["material.opacity", "0.5"],
