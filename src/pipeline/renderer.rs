@@ -144,7 +144,7 @@ pub trait FrameRenderer: Send + Sync {
     fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError>;
 
     /// Renders `frame`, which must be the one prepared last. What needs no renderer any more is left to
-    /// [`TracedFrame::finish`]. It can be rendered again, also with
+    /// `TracedFrame::finish`. It can be rendered again, also with
     /// other settings of what does not belong to its particles.
     ///
     /// # Errors
