@@ -144,8 +144,8 @@ pub trait FrameRenderer: Send + Sync {
     fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError>;
 
     /// Renders `frame`, which must be the one prepared last. What needs no renderer any more is left to
-    /// `TracedFrame::finish`. It can be rendered again, also with
-    /// other settings of what does not belong to its particles.
+    /// `TracedFrame::finish`. It can be rendered again, also with other settings of what does not belong to its
+    /// particles.
     ///
     /// # Errors
     /// [`crate::render::RenderError::Interrupted`] if `stop` is raised, [`TraceError::File`] if a native frame
