@@ -33,6 +33,7 @@ mod images;
 mod lattice_tests;
 mod lights;
 mod meshes;
+mod mist;
 mod opacity;
 mod overlay;
 mod question;

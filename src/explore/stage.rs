@@ -25,7 +25,7 @@ use crate::survey::Survey;
 const DRAFT_PHOTONS: u32 = 50_000;
 
 /// Beginnings of keys that need no other particles and no other tree.
-const SHADING_KEYS: [&str; 28] = [
+const SHADING_KEYS: [&str; 29] = [
     "camera.",
     "image.",
     "output.",
@@ -43,6 +43,7 @@ const SHADING_KEYS: [&str; 28] = [
     "material.scattering",
     "material.shininess",
     "material.specular",
+    "mist.",
     "render.background",
     "render.bounces",
     "render.clamp",

@@ -248,6 +248,7 @@ pub fn suits(setup: &Setup, sequence: &Sequence, particles: u64) -> Result<(), O
 fn key_of(missing: Missing) -> &'static str {
     match missing {
         Missing::Scattering => "material.scattering",
+        Missing::Mist => "mist.visibility",
         Missing::Photons => "render.caustics",
         Missing::StylesInGlass => "style",
         Missing::Ground => "render.ground",

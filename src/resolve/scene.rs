@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::camera::PlacedCamera;
 use super::environment::{Surroundings, surroundings};
 use super::ground::GroundPlace;
-use super::{Extent, ResolveError, SceneInputs, ground, lights, surface};
+use super::{Extent, ResolveError, SceneInputs, ground, lights, mist, surface};
 use crate::manifest::Manifest;
 use crate::render::IntegratorKind;
 use crate::scene::{Background, DEFAULT_AMBIENT_LIGHT, Scene, default_lights};
@@ -51,6 +51,7 @@ pub(super) fn scene(
         background: background(manifest, up.as_vec3()),
         ground: ground::ground(manifest, &place),
         wet_ground: ground::wet_ground(manifest, &place),
+        mist: None,
         particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
         environment,
         is_environment_visible: manifest.environment.visible,
@@ -59,6 +60,7 @@ pub(super) fn scene(
         previous_frame: None,
         exposure: None,
     };
+    scene.mist = mist::mist(manifest, bounds, &scene, up.as_vec3());
     scene.set_spray_soft(manifest.draws_soft_spray());
     Ok(scene)
 }

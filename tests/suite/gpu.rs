@@ -205,6 +205,9 @@ mod on_a_device {
         let lacking = ["still", "in", "-o", "c.png", "--device=gpu"];
         let ran = workshop.run(&[&lacking[..], &murky, &SMALL].concat()).expect(2);
         ran.prints("material.scattering: media that scatter light cannot be rendered on a GPU yet");
+        let lacking = ["still", "in", "-o", "d.png", "--device=gpu", "--set=mist.visibility=3"];
+        let ran = workshop.run(&[&lacking[..], &SMALL].concat()).expect(2);
+        ran.prints("mist.visibility: mist cannot be rendered on a GPU yet");
     }
 
     #[test]

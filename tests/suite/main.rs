@@ -37,6 +37,7 @@ mod in_memory;
 mod in_place;
 mod memory;
 mod meshes;
+mod mist;
 mod movies;
 mod names_of_atoms;
 mod opacity;

@@ -41,6 +41,8 @@ use crate::{Device, GpuError};
 pub enum Missing {
     /// Media inside particles that scatter light.
     Scattering,
+    /// Mist above the ground.
+    Mist,
     /// Light that transmissive particles focus on other surfaces.
     Photons,
     /// Styles beside transmissive particles.
@@ -71,6 +73,7 @@ impl fmt::Display for Missing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Scattering => "media that scatter light",
+            Self::Mist => "mist",
             Self::Photons => "caustics of transmissive particles",
             Self::StylesInGlass => "styles beside transmissive particles",
             Self::Ground => "a ground in Whitted's model, or one of sand or with a picture",
@@ -102,6 +105,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     };
     [
         (scene.materials.iter().any(scene::Material::scatters), Missing::Scattering),
+        (scene.mist.is_some(), Missing::Mist),
         (needs_photons(scene, settings), Missing::Photons),
         (is_clear && (has_styles || is_glossy), Missing::StylesInGlass),
         (scene.ground.as_ref().is_some_and(|ground| !is_plain(ground)), Missing::Ground),

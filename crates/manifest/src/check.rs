@@ -77,6 +77,8 @@ pub(super) const RULES: &[Rule] = rules! {
     "render.integrator" Is["whitted"] => "material.part" Missing:
         "render.integrator = \"whitted\" has one material for all particles; choose \"path\" (--integrator path), or \
          leave the parts out";
+    "render.integrator" Is["whitted"] => "mist.visibility" Missing:
+        "render.integrator = \"whitted\" has no mist; choose \"path\" (--integrator path), or leave it out";
     "render.integrator" Is["whitted"] => "render.ground" MissingOrNot["shadow_catcher"]:
         "render.integrator = \"whitted\" has no shadow catcher; choose \"path\" (--integrator path), or a plain ground";
 };
@@ -142,6 +144,7 @@ impl Manifest {
         self.check_styles(root);
         self.check_scattering(root);
         self.check_noise(root);
+        self.mist.check(root);
     }
 
     /// Checks that tiles may have as many samples as they have at least.

@@ -23,6 +23,8 @@ pub(super) enum Affects {
     Sky,
     /// An image as environment of the path integrator.
     EnvironmentImage,
+    /// Mist.
+    Mist,
     /// The channel for light groups.
     LightGroups,
     /// A limit of noise.
@@ -51,6 +53,7 @@ impl Affects {
             Self::EnvironmentImage => {
                 "Changes images of `integrator = \"path\"` with an image as environment."
             }
+            Self::Mist => "Changes images with `mist.visibility`.",
             Self::LightGroups => "Changes images with the channel `light_groups`.",
             Self::NoiseLimit => "Changes images with `render.noise`.",
         }

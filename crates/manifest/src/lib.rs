@@ -87,6 +87,7 @@ mod look;
 mod manual;
 mod material;
 mod mesh;
+mod mist;
 mod nearest;
 mod opacity;
 mod output;
@@ -147,6 +148,7 @@ pub use light::{Light, LightKind};
 pub use look::{Look, draft};
 pub use material::{Material, MaterialKind};
 pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
+pub use mist::Mist;
 #[doc(hidden)]
 pub use nearest::nearest;
 pub use opacity::OpacitySetting;
@@ -203,6 +205,8 @@ pub struct Manifest {
     pub material: Material,
     /// Light from infinitely far away.
     pub environment: Environment,
+    /// Mist above the ground.
+    pub mist: Mist,
     /// Light sources; without any, whitted has a key light and a soft fill light, placed relative to the camera.
     pub lights: Vec<Light>,
     /// The simulation cell.
@@ -241,6 +245,7 @@ impl Manifest {
             surface: SurfaceSettings::DEFAULT,
             material: Material::default(),
             environment: Environment::default(),
+            mist: Mist::default(),
             lights: Vec::new(),
             cell: Cell::default(),
             meshes: Vec::new(),
@@ -344,6 +349,7 @@ impl Manifest {
         keys.section("environment", environment::ABOUT, |keys| {
             self.environment.keys(keys);
         });
+        keys.section("mist", Mist::ABOUT, |keys| self.mist.keys(keys));
         keys.section("cell", Cell::ABOUT, |keys| self.cell.keys(keys));
         keys.section("trails", Trails::ABOUT, |keys| self.trails.keys(keys));
         keys.section("bonds", Bonds::ABOUT, |keys| self.bonds.keys(keys));
@@ -479,6 +485,7 @@ impl Manifest {
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
             Affects::Sky => self.has_environment(EnvironmentKind::Sky),
             Affects::EnvironmentImage => self.has_environment(EnvironmentKind::Image),
+            Affects::Mist => self.mist.visibility.is_some(),
             Affects::NoiseLimit => self.render.noise.is_some(),
             Affects::LightGroups => {
                 let channel = Channel::plane(FilmPlane::LightGroups);

@@ -85,6 +85,7 @@ const TABLES: [(&str, &str); 54] = [
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
     ("/properties/camera/properties/key/items", "[[camera.key]]\n"),
+    ("/properties/mist", "[mist]\n"),
     ("/properties/cell", "[cell]\n"),
     ("/properties/image", "[image]\n"),
     ("/properties/render", "[render]\n"),

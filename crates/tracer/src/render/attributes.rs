@@ -131,6 +131,8 @@ impl RenderContext<'_> {
     pub(super) fn coverage(&self, hits: &Intersections, otherwise: &Lanes) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => otherwise[lane],
+            // Mist in front of what is hidden covers it
+            _ if otherwise[lane] == 1.0 => 1.0,
             _ if self.is_holdout(hits.material[lane]) => 0.0,
             _ if self.settings.transparent_background => {
                 otherwise[lane] + (1.0 - otherwise[lane]) * hits.opacity[lane]

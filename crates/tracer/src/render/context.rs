@@ -10,6 +10,7 @@ use super::{
     interface::{BoundaryTable, Dielectric},
     light_groups::NO_GROUP,
     lights::{Light, light_of},
+    mist::MistLayer,
     sampler::FilmSampler,
     scene_shapes::{Interior, SceneShapes},
     scratch::SEGMENTS,
@@ -31,7 +32,9 @@ pub(super) struct RenderContext<'a> {
     pub(super) shapes: SceneShapes<'a>,
     /// Whether some of the particles have a style with a material of its own.
     pub(super) has_styles: bool,
-    /// Whether the medium of a transmissive body scatters light along paths.
+    /// Mist outside all bodies, along paths.
+    pub(super) mist: Option<MistLayer>,
+    /// Whether mist, or the medium of a transmissive body, scatters light along paths.
     pub(super) has_scattering: bool,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
@@ -100,9 +103,11 @@ impl<'a> RenderContext<'a> {
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         let is_body = shapes.interior == Interior::Body;
         let nested = shapes.nested.as_ref();
+        let mist = MistLayer::of(scene, settings);
         Self {
             has_scattering: settings.integrator == IntegratorKind::Path
-                && shapes.has_scattering(scene),
+                && (mist.is_some() || shapes.has_scattering(scene)),
+            mist,
             boundaries: nested.map(BoundaryTable::for_shadow_rays),
             camera_bodies: nested.map(|nested| nested.at(eye)).unwrap_or_default(),
             is_camera_inside: is_body && shapes.particles.is_some_and(contains_eye),

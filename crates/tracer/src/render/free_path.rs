@@ -13,6 +13,7 @@
 use glam::Vec3;
 
 use super::body_set::BodySet;
+use super::density_profile::DensityProfile;
 use crate::scene::Material;
 use spherule_tree::math::functions::{exp, ln};
 use spherule_tree::math::{LANES, Lanes};
@@ -22,10 +23,14 @@ use spherule_tree::math::{LANES, Lanes};
 pub(super) struct MediumPart {
     /// Distance along the ray.
     pub(super) end: f32,
-    /// Coefficients, per length.
+    /// Coefficients, per length, where the density is 1.
     pub(super) extinction: Vec3,
     pub(super) scattering: Vec3,
     pub(super) anisotropy: f32,
+    /// The density along the part.
+    pub(super) profile: DensityProfile,
+    /// Whether it is in mist, outside all bodies.
+    pub(super) is_mist: bool,
     /// The body whose surface the ray passes straight at the end, if there may be several.
     pub(super) crossed: BodySet,
 }
@@ -33,14 +38,39 @@ pub(super) struct MediumPart {
 impl MediumPart {
     /// Air up to a distance.
     pub(super) const fn air(end: f32) -> Self {
-        let (extinction, scattering) = (Vec3::ZERO, Vec3::ZERO);
-        Self { end, extinction, scattering, anisotropy: 0.0, crossed: BodySet::EMPTY }
+        Self {
+            end,
+            extinction: Vec3::ZERO,
+            scattering: Vec3::ZERO,
+            anisotropy: 0.0,
+            profile: DensityProfile::CONSTANT,
+            is_mist: false,
+            crossed: BodySet::EMPTY,
+        }
     }
 
     /// The medium of a `material` with this extinction up to a distance.
     pub(super) const fn of(material: &Material, extinction: Vec3, end: f32) -> Self {
         let Material { scattering, anisotropy, .. } = *material;
-        Self { end, extinction, scattering, anisotropy, crossed: BodySet::EMPTY }
+        Self { extinction, scattering, anisotropy, ..Self::air(end) }
+    }
+
+    /// Mist with these coefficients at its base up to a distance.
+    pub(super) fn of_mist(
+        extinction: f32,
+        albedo: Vec3,
+        anisotropy: f32,
+        profile: DensityProfile,
+        end: f32,
+    ) -> Self {
+        Self {
+            extinction: Vec3::splat(extinction),
+            scattering: extinction * albedo,
+            anisotropy,
+            profile,
+            is_mist: true,
+            ..Self::air(end)
+        }
     }
 
     pub(super) fn scatters(&self) -> bool {
@@ -67,6 +97,8 @@ pub(super) struct MediaAlong {
     pub(super) sampled: u32,
     /// Lanes of rays that end in a medium, and have no intersection.
     pub(super) scattered: u32,
+    /// Those of them that end in mist.
+    pub(super) in_mist: u32,
     /// Those of them that would meet a surface otherwise, whose data stay in the intersections.
     pub(super) hidden: u32,
     /// The anisotropy of the medium in which each of them ends.
@@ -76,7 +108,8 @@ pub(super) struct MediaAlong {
 impl MediaAlong {
     /// Forgets all rays.
     pub(super) const fn clear(&mut self) {
-        (self.sampled, self.scattered, self.hidden) = (0, 0, 0);
+        (self.sampled, self.scattered) = (0, 0);
+        (self.in_mist, self.hidden) = (0, 0);
     }
 
     /// The weight of the ray in `lane` if it passes all media up to a distance.
@@ -92,9 +125,9 @@ pub(super) fn free_path(parts: &[MediumPart], channel: usize, u: f32) -> f32 {
     let (mut left, mut from) = (-ln(1.0 - u), 0.0_f32);
     for part in parts {
         let coefficient = part.sampled()[channel];
-        let depth = coefficient * (part.end - from).max(0.0);
+        let depth = coefficient * part.profile.equal_length((part.end - from).max(0.0));
         if left < depth {
-            return (from + left / coefficient).min(part.end);
+            return (from + part.profile.length_of(left / coefficient)).min(part.end);
         }
         left -= depth;
         from = from.max(part.end);
@@ -108,7 +141,7 @@ pub(super) fn weight(parts: &[MediumPart], channels: Vec3, distance: f32, scatte
     let (mut depth, mut sampled, mut from) = (Vec3::ZERO, Vec3::ZERO, 0.0_f32);
     let mut last = None;
     for part in parts {
-        let length = (part.end.min(distance) - from).max(0.0);
+        let length = part.profile.equal_length((part.end.min(distance) - from).max(0.0));
         depth += length * part.extinction;
         sampled += length * part.sampled();
         if distance <= part.end {

@@ -57,6 +57,9 @@ impl RenderContext<'_> {
             Some(nested) => self.absorb_nested(nested, segments, packet),
             None => self.absorb(segments, packet),
         }
+        if packet.media.only_attenuate {
+            self.attenuate_photons(segments, packet);
+        }
     }
 
     /// Replaces the material of particles by that of their style.

@@ -1,4 +1,4 @@
-//! Media that scatter light inside transmissive bodies: finds them along rays, and ends rays where their free paths end
+//! Media that scatter light inside transmissive bodies, and mist outside (`mist.rs`): finds them along rays, and ends rays where their free paths end
 //! (`free_path.rs`). `path/scattering.rs` has the light there.
 
 use glam::Vec3;
@@ -54,6 +54,9 @@ impl RenderContext<'_> {
     /// the media along them. Moves `segments` into the bodies in which the rays end.
     pub(super) fn end_free_paths(&self, segments: &mut SegmentPacket, packet: &mut PacketScratch) {
         let PacketScratch { media, hits, throughput, .. } = packet;
+        // A shadow catcher has no data
+        let is_catcher = self.catches_shadows();
+        let invisible = if is_catcher { hits.lanes_of(MaterialId::GROUND) } else { 0 };
         for lane in lanes_in(segments.lanes()) {
             let parts = &media.parts[lane];
             if parts.is_empty() {
@@ -74,9 +77,10 @@ impl RenderContext<'_> {
             }
             if is_scattered {
                 media.scattered |= 1 << lane;
-                media.hidden |= hits.mask & 1 << lane;
+                media.hidden |= hits.mask & !invisible & 1 << lane;
                 let last = parts.iter().find(|part| end <= part.end);
                 media.anisotropy[lane] = last.map_or(0.0, |part| part.anisotropy);
+                media.in_mist |= u32::from(last.is_some_and(|part| part.is_mist)) << lane;
             }
         }
         hits.mask &= !media.scattered;
@@ -113,6 +117,9 @@ impl RenderContext<'_> {
             }
             _ => {}
         }
+        if self.shapes.nested.is_none() {
+            self.find_mist(segments, packet);
+        }
     }
 
     /// The same with several bodies, whose surfaces between equal media rays pass.
@@ -124,10 +131,16 @@ impl RenderContext<'_> {
     ) {
         let PacketScratch { media, hits, straight, .. } = packet;
         let (mut sets, mut from) = (segments.bodies, splat(0.0));
-        let part = |set: BodySet, lane: usize, ends: [f32; 2]| match nested.absorbing(set.medium())
-        {
-            Some(body) => self.part_in(body, segments, lane, ends),
-            None => MediumPart::air(ends[1]),
+        let mut push = |set: BodySet, lane: usize, ends: [f32; 2], crossed: BodySet| {
+            let parts = &mut media.parts[lane];
+            match nested.absorbing(set.medium()) {
+                _ if set.is_empty() => self.push_air(segments, lane, ends, crossed, parts),
+                Some(body) => {
+                    let part = self.part_in(body, segments, lane, ends);
+                    parts.push(MediumPart { crossed, ..part });
+                }
+                None => parts.push(MediumPart { crossed, ..MediumPart::air(ends[1]) }),
+            }
         };
         for crossing in straight.iter() {
             let (lane, t) = (crossing.lane, crossing.t);
@@ -135,15 +148,16 @@ impl RenderContext<'_> {
             if hits.mask >> lane & 1 == 1 && t >= hits.t[lane] {
                 continue;
             }
-            let passed =
-                MediumPart { crossed: crossing.body, ..part(sets[lane], lane, [from[lane], t]) };
-            media.parts[lane].push(passed);
+            push(sets[lane], lane, [from[lane], t], crossing.body);
             sets[lane] = sets[lane].across(crossing.body);
             from[lane] = t;
         }
-        for lane in lanes_in(segments.lanes() & hits.mask) {
-            if !sets[lane].is_empty() {
-                media.parts[lane].push(part(sets[lane], lane, [from[lane], hits.t[lane]]));
+        // A ray inside a body without an intersection has left through a crack in the surface
+        for lane in lanes_in(segments.lanes()) {
+            let is_hit = hits.mask >> lane & 1 == 1;
+            if is_hit || sets[lane].is_empty() {
+                let end = if is_hit { hits.t[lane] } else { f32::INFINITY };
+                push(sets[lane], lane, [from[lane], end], BodySet::EMPTY);
             }
         }
     }

@@ -26,6 +26,7 @@ mod channels;
 mod clamp;
 mod context;
 pub mod cryptomatte;
+mod density_profile;
 pub mod device;
 mod dimensions;
 mod drawing;
@@ -43,6 +44,7 @@ mod light_groups;
 mod light_split;
 mod lights;
 mod media;
+mod mist;
 mod near_photons;
 mod nested;
 mod noise;
@@ -241,6 +243,9 @@ pub fn render_into(
     settings.validate_light_groups(scene)?;
     for material in &scene.materials {
         material.validate()?;
+    }
+    if let Some(mist) = &scene.mist {
+        mist.validate()?;
     }
     let count = scene.materials.len();
     let used = shapes.iter().map(|shape| shape.material().index());

@@ -135,6 +135,10 @@ impl Integrator for PathIntegrator<'_> {
         packet.take_light(LightClass::Emission);
         let scattered = packet.media.scattered & !ended;
         packet.media.hidden &= scattered;
+        // Mist covers what is behind it
+        for lane in lanes_in(scattered & packet.media.in_mist) {
+            packet.coverage[lane] = 1.0;
+        }
         // Camera rays that hit nothing see walls of glass
         let unended = segments.lanes() & !(ended | scattered);
         self.context.pass_underlays(segments, depth, unended, self.environment, packet);
@@ -382,7 +386,10 @@ impl PathIntegrator<'_> {
         let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
         let PacketScratch { light: samples, crossings, counts, .. } = packet;
         match occlusion {
-            Occlusion::None => samples.lanes,
+            Occlusion::None => {
+                context.attenuate_by_mist(segments, samples);
+                samples.lanes
+            }
             Occlusion::Straight => {
                 context.trace_shadow_rays(segments, depth, samples, crossings, counts)
             }

@@ -3,8 +3,9 @@
 //! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
 //! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
 //! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
-//! body attenuates them as well. Of several bodies, only boundaries between different media count. Panes (`panes.rs`), soft spray (`spray.rs`) and
-//! spheres that are not fully opaque (`translucent.rs`) attenuate all shadow rays.
+//! body attenuates them as well, and mist outside (`mist.rs`). Of several bodies, only boundaries between different media
+//! count. Panes (`panes.rs`), soft spray (`spray.rs`) and spheres that are not fully opaque (`translucent.rs`) attenuate
+//! all shadow rays.
 
 use super::{
     absorption::InsideSegments,
@@ -62,7 +63,10 @@ impl RenderContext<'_> {
         let mut transmittance = [splat(1.0); 3];
         let (shapes, unattenuated) = (&self.shapes, &*samples);
         let reached = match (shapes.interior, &shapes.nested, shapes.particles) {
-            (Interior::Opaque, ..) => return samples.lanes,
+            (Interior::Opaque, ..) => {
+                self.attenuate_by_mist(segments, samples);
+                return samples.lanes;
+            }
             (Interior::Nested, Some(nested), _) => {
                 let sets = segments.bodies;
                 self.cross_bodies(nested, unattenuated, sets, crossings, &mut transmittance)
@@ -75,7 +79,10 @@ impl RenderContext<'_> {
                 self.cross_murky_spheres(spheres, unattenuated, crossings, &mut transmittance)
             }
             (_, _, Some(spheres)) => self.cross_spheres(spheres, unattenuated, &mut transmittance),
-            (_, _, None) => return samples.lanes,
+            (_, _, None) => {
+                self.attenuate_by_mist(segments, samples);
+                return samples.lanes;
+            }
         };
         // Attenuate the light
         let unoccluded = samples.radiance;
@@ -100,6 +107,7 @@ impl RenderContext<'_> {
         self.attenuate_by_panes(samples, coherence);
         self.attenuate_by_spray(samples, coherence);
         self.attenuate_by_opacity(samples, coherence);
+        self.attenuate_by_mist(segments, samples);
         samples.lanes
     }
 
@@ -162,8 +170,14 @@ impl RenderContext<'_> {
             spheres.intersect(&mut remaining, Coherence::Incoherent, 0, hits);
             let found = hits.mask & alive;
 
-            // Attenuate by the sphere that the ray leaves, and by the crossing in front of the light
-            for lane in lanes_in(found & leaving(self.simd, rays, hits)) {
+            // Attenuate by the sphere that the ray leaves or by the mist outside, and by the crossing in front of the light
+            let inside = found & leaving(self.simd, rays, hits);
+            for lane in lanes_in(alive & !inside) {
+                let next = if found >> lane & 1 == 1 { hits.t[lane] } else { far[lane] };
+                let ends = [from[lane], next.min(rays.t_max[lane])];
+                self.attenuate_outside(samples, lane, ends, transmittance);
+            }
+            for lane in lanes_in(inside) {
                 let length = (hits.t[lane].min(rays.t_max[lane]) - from[lane]).max(0.0);
                 let extinction = self.sphere_extinction(hits.particle[lane]);
                 let passing = extinction.map(|coefficient| exp(-length * coefficient));
@@ -217,6 +231,10 @@ impl RenderContext<'_> {
             let length = inside_lengths(rays, hits, crossing, lanes, &from);
             let segments = InsideSegments { rays, from: &from, length: &length, lanes };
             self.absorb_in(&medium, segments, transmittance);
+            for lane in lanes_in(alive & !inside) {
+                let end = if crossing >> lane & 1 == 1 { hits.t[lane] } else { rays.t_max[lane] };
+                self.attenuate_outside(samples, lane, [from[lane], end], transmittance);
+            }
             cross_straight(self.simd, boundary, rays, hits, crossing, transmittance);
 
             // End rays without transmittance
@@ -272,6 +290,10 @@ impl RenderContext<'_> {
                     let segments = InsideSegments { rays, from: &from, length: &length, lanes };
                     self.absorb_in(body, segments, transmittance);
                 }
+            }
+            for lane in lanes_in(alive).filter(|lane| sets[*lane].is_empty()) {
+                let end = if crossing >> lane & 1 == 1 { hits.t[lane] } else { rays.t_max[lane] };
+                self.attenuate_outside(samples, lane, [from[lane], end], transmittance);
             }
             self.cross_boundaries(nested, (rays, hits), crossing, &sets, transmittance);
 

@@ -19,6 +19,7 @@ pub mod ground;
 pub mod lens;
 pub mod light;
 pub mod material;
+pub mod mist;
 pub mod path;
 pub mod projection;
 pub mod rgb;
@@ -38,6 +39,7 @@ pub use ground::{Ground, WetGround};
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Finish, Fresnel, Material, MaterialError, Owner};
+pub use mist::Mist;
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use projection::Projection;
 pub use rgb::{RgbEncoding, is_rgb};
@@ -107,6 +109,8 @@ pub struct Scene {
     pub ground: Option<Ground>,
     /// How the fluid wets a visible ground, with path tracing.
     pub wet_ground: Option<WetGround>,
+    /// Mist in the air outside all bodies, with path tracing.
+    pub mist: Option<Mist>,
     /// Corners of the box of the particles of all frames: the target of photons.
     pub particles: [Vec3; 2],
     /// Light from infinitely far away, for path tracing.
@@ -153,6 +157,7 @@ impl Scene {
             background: Background::Constant(Vec3::ZERO),
             ground: None,
             wet_ground: None,
+            mist: None,
             particles: [Vec3::ZERO; 2],
             environment: None,
             is_environment_visible: false,

@@ -105,6 +105,8 @@ pub(in crate::render) struct LightSamples {
     pub(in crate::render) pdf: Lanes,
     /// Lanes that the light reaches.
     pub(in crate::render) lanes: u32,
+    /// Whether mist takes nothing of it, as on a shadow catcher.
+    pub(in crate::render) ignores_mist: bool,
 }
 
 /// The intersections of rays with a light.

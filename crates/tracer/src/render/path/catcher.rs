@@ -171,11 +171,13 @@ impl PathIntegrator<'_> {
         let points = &mut packet.surface;
         surface_points(simd, rays, &packet.hits, &packet.base, points);
         let mut light = CaughtLight { whole: splat3(catcher.whole), lost: [splat(0.0); 3] };
-        // Add the light that is lost from each source
+        // Add the light that is lost from each source; that which mist takes is not lost to a shadow
+        packet.light.ignores_mist = true;
         if let Some(environment) = &catcher.environment {
             self.lose_environment(environment, surface, packet, &mut light);
         }
         self.lose_lights(surface, packet, &mut light);
+        packet.light.ignores_mist = false;
         // Caustics bring some of it back
         if let Some(caustics) = &self.caustics.catcher {
             for lane in lanes_in(surface.lanes) {

@@ -92,6 +92,11 @@ impl Emitter {
         (0..).zip(sources.into_iter().zip(&powers)).map(emitter).collect()
     }
 
+    /// Whether its light is parallel, or almost, and comes from infinitely far away.
+    pub(super) const fn is_parallel(&self) -> bool {
+        matches!(self.source, Source::Parallel(_))
+    }
+
     /// The ray of a photon, and its flux. `None` if no light leaves in its direction.
     pub(super) fn photon(&self, photon: u32) -> Option<(Ray, Vec3)> {
         let position = self.seed.get_2d(POSITION, photon);

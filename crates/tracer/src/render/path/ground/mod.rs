@@ -54,7 +54,7 @@ pub(super) struct GroundLight {
     caustics: CausticMap,
     sky: Map,
     wet: Option<WetMap>,
-    /// Light of the environment without particles.
+    /// Light of the environment, and of mist, without particles.
     open: Vec3,
     /// The light of the sky by light group; empty if the film has no layers for groups.
     groups: Vec<GroupSky>,
@@ -119,6 +119,18 @@ impl Map {
         let corners = corners(self.side, position);
         let terms = corners.map(|(texel, weight)| weight * self.texels[texel]);
         terms.into_iter().sum()
+    }
+}
+
+impl Map {
+    /// The mean of the texels at its border.
+    fn mean_of_border(&self) -> Vec3 {
+        let side = self.side;
+        let is_border = |i: usize| [i % side, i / side].iter().any(|at| *at == 0 || at + 1 == side);
+        let texels = (0..self.texels.len()).filter(|i| is_border(*i));
+        let (sum, count) = texels
+            .fold((Vec3::ZERO, 0.0_f32), |(sum, count), i| (sum + self.texels[i], count + 1.0));
+        sum / count.max(1.0)
     }
 }
 
@@ -310,16 +322,22 @@ impl<'a> PathIntegrator<'a> {
         stop: &dyn Stop,
     ) -> Option<(GroundLight, RayCounts)> {
         let (sky, of_sky) = sky::sky(self, &caustics.square, stop)?;
-        let open =
+        let of_surroundings =
             self.environment.map(|e| e.irradiance(ground.up) * FRAC_1_PI).unwrap_or_default();
+        // With mist, the light far from the particles is that at the border of the map
+        let open_of = |sky: &Map, without_mist: Vec3| match &self.context.mist {
+            Some(_) => sky.mean_of_border(),
+            None => without_mist,
+        };
+        let open = open_of(&sky.all, of_surroundings);
         let wet = match self.wet_scene(&caustics.square) {
             Some(wet) => Some(wet.map(stop)?),
             None => None,
         };
         let of_environment = self.context.environment_group();
-        let group = |(number, sky)| GroupSky {
-            sky,
-            open: if number == of_environment { open } else { Vec3::ZERO },
+        let group = |(number, sky)| {
+            let own = if number == of_environment { of_surroundings } else { Vec3::ZERO };
+            GroupSky { open: open_of(&sky, own), sky }
         };
         let groups = sky.groups.into_iter().enumerate().map(group).collect();
         Some((GroundLight { caustics, sky: sky.all, wet, open, groups }, of_sky))

@@ -16,6 +16,7 @@ use super::photon_map::{Collector, Photon};
 use super::{CausticMap, Map, Square};
 use crate::render::{
     body_set::BodySet,
+    mist::MistLayer,
     ray_counts::RayCounts,
     scratch::PacketScratch,
     stop::Stop,
@@ -23,6 +24,7 @@ use crate::render::{
 };
 use spherule_surface::MaterialId;
 use spherule_tree::math::{LANES, lane3, lanes_in, set_lane3, splat};
+use spherule_tree::ray::Ray;
 
 /// Photons that are traced as one task.
 const TASK: u32 = 4096;
@@ -147,15 +149,25 @@ impl Targets<'_> {
     }
 }
 
-/// A packet of photons from number `first` on.
-fn emit(emitter: &Emitter, first: u32, end: u32, segments: &mut SegmentPacket) {
+/// A packet of photons from number `first` on, without those that `mist` takes in front of the origins of their rays.
+fn emit(
+    emitter: &Emitter,
+    mist: Option<&MistLayer>,
+    [first, end]: [u32; 2],
+    segments: &mut SegmentPacket,
+) {
     segments.rays.reset();
     for photon in (first..end).take(LANES) {
         if let Some((ray, flux)) = emitter.photon(photon) {
             let lane = segments.rays.len();
             segments.rays.push(&ray);
             segments.path[lane] = emitter.seed.child(photon);
-            set_lane3(&mut segments.throughput, lane, flux);
+            // Parallel light comes from infinitely far away
+            let before = Ray::new(ray.origin, -ray.direction);
+            let passing = mist
+                .filter(|_| emitter.is_parallel())
+                .map_or(1.0, |mist| mist.transmittance(&before, [0.0, f32::INFINITY]));
+            set_lane3(&mut segments.throughput, lane, flux * passing);
         }
     }
     segments.pdf = splat(f32::INFINITY);
@@ -184,7 +196,8 @@ impl Task<'_> {
         // Emit the photons
         let mut segments = Box::<SegmentPacket>::default();
         for first in range.clone().step_by(LANES) {
-            emit(self.emitter, first, range.end, &mut segments);
+            let mist = self.integrator.context.mist.as_ref();
+            emit(self.emitter, mist, [first, range.end], &mut segments);
             packet.counts.shadow += segments.rays.len() as u64;
             self.step(&mut segments, FIRST_DEPTH, &mut packet, &mut next);
         }
