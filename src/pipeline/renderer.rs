@@ -91,7 +91,7 @@ impl TracedFrame {
 }
 
 /// An image that is no longer in its renderer, and not in the planes of its frame yet.
-pub(super) trait UnfinishedImage: std::fmt::Debug + Send {
+pub(super) trait UnfinishedImage: std::fmt::Debug + Send + Sync {
     /// Fills the planes of `frame`.
     ///
     /// # Errors

@@ -61,14 +61,11 @@ impl MistLayer {
             let (at_base, at_top) = (-height / slope, (self.top - height) / slope);
             (from.max(at_base.min(at_top)), to.min(at_base.max(at_top)))
         };
-        // Written so that NaN counts as outside
-        if !(start < end) {
-            return None;
-        }
+        // Find the density there; NaN counts as outside
         let entered = (height + slope * start).clamp(0.0, self.top);
         let density = exp(-(entered / scale_height).min(TOP));
         let rate = (slope / scale_height).clamp(-f32::MAX, f32::MAX);
-        Some(InMist { start, end, profile: DensityProfile { density, rate } })
+        (start < end).then_some(InMist { start, end, profile: DensityProfile { density, rate } })
     }
 
     /// The part of the light along `ray` that the mist leaves between two distances.
