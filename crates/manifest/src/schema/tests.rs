@@ -80,7 +80,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 54] = [
+const TABLES: [(&str, &str); 55] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
