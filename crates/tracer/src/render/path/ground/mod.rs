@@ -120,9 +120,7 @@ impl Map {
         let terms = corners.map(|(texel, weight)| weight * self.texels[texel]);
         terms.into_iter().sum()
     }
-}
 
-impl Map {
     /// The mean of the texels at its border.
     fn mean_of_border(&self) -> Vec3 {
         let side = self.side;
