@@ -20,7 +20,7 @@ fn wall() -> Workshop {
 
 const VIEW: &str = "output.preview = false
 output.transparent = true
-render = { ground = \"plain\", ground_height = 0.0, denoise = false, bounces = 0 }
+render = { ground = \"plain\", ground_height = 0.0, ground_reach = \"far\", denoise = false, bounces = 0 }
 material.color = [1, 1, 1]
 ";
 

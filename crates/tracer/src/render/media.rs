@@ -1,5 +1,5 @@
-//! Media that scatter light inside transmissive bodies, and mist outside (`mist.rs`): finds them along rays, and ends
-//! rays where their free paths end (`free_path.rs`). `path/scattering.rs` has the light there.
+//! Media that scatter light inside transmissive bodies, and mist outside (`mist_rays.rs`): finds them along rays, and
+//! ends rays where their free paths end (`free_path.rs`). `path/scattering.rs` has the light there.
 
 use glam::Vec3;
 

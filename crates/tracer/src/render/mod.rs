@@ -45,6 +45,7 @@ mod light_split;
 mod lights;
 mod media;
 mod mist;
+mod mist_rays;
 mod near_photons;
 mod nested;
 mod noise;

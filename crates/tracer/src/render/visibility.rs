@@ -3,9 +3,9 @@
 //! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
 //! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
 //! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
-//! body attenuates them as well, and mist outside (`mist.rs`). Of several bodies, only boundaries between different media
-//! count. Panes (`panes.rs`), soft spray (`spray.rs`) and spheres that are not fully opaque (`translucent.rs`) attenuate
-//! all shadow rays.
+//! body attenuates them as well, and mist outside (`mist_rays.rs`). Of several bodies, only boundaries between different
+//! media count. Panes (`panes.rs`), soft spray (`spray.rs`) and spheres that are not fully opaque (`translucent.rs`)
+//! attenuate all shadow rays.
 
 use super::{
     absorption::InsideSegments,
@@ -170,7 +170,7 @@ impl RenderContext<'_> {
             spheres.intersect(&mut remaining, Coherence::Incoherent, 0, hits);
             let found = hits.mask & alive;
 
-            // Attenuate by the sphere that the ray leaves or by the mist outside, and by the crossing in front of the light
+            // Attenuate by the sphere that the ray leaves or by mist, and by the crossing in front of the light
             let inside = found & leaving(self.simd, rays, hits);
             for lane in lanes_in(alive & !inside) {
                 let next = if found >> lane & 1 == 1 { hits.t[lane] } else { far[lane] };
