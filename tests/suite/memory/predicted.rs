@@ -213,11 +213,7 @@ fn every_text_format() {
     compare("ply", |path| write(path, ply(COUNT)), &SMALL);
     compare("xyz", |path| write(path, xyz(COUNT)), &SMALL);
     compare("vtk", |path| write(path, vtk_text(COUNT)), &SMALL);
-    // The allocator keeps more of what the survey of such small compressed frames has freed than the model knows
-    let (predicted, measured) =
-        peaks("vtk.gz", |path| gz(path, vtk_text(COUNT).as_bytes()), &SMALL);
-    let most = 1.5 * predicted + TOLERANCE.1;
-    assert!((0.8 * predicted..=most).contains(&measured), "{predicted}, measured {measured}");
+    compare("vtk.gz", |path| gz(path, vtk_text(COUNT).as_bytes()), &SMALL);
 }
 
 #[test]
