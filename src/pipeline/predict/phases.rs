@@ -9,9 +9,9 @@ use crate::scene::ground::Pattern;
 use crate::surface::SurfaceKind;
 use crate::surface::mesh::MeshTree;
 
-/// Memory of the program: its data (a mebibyte of them is relocated), the stacks of its threads and small allocations; large
-/// allocations are returned to the system when they are freed. Measured on sequences of up to 1e6 particles, as the remainder of the other
-/// parts.
+/// Memory of the program: its data (a mebibyte of them is relocated), the stacks of its threads and small allocations;
+/// large allocations are returned to the system when they are freed. Measured on sequences of up to 1e6 particles, as the
+/// remainder of the other parts.
 const PROGRAM: u64 = 6 << 20;
 /// Additional memory per thread.
 const THREAD: u64 = 256 << 10;

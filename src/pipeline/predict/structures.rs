@@ -13,7 +13,7 @@ use crate::surface::{SurfaceBytes, SurfaceKind};
 /// One in this many particles is assumed to be spray in a frame of which nothing is known.
 const PARTICLES_PER_DROP: u64 = 10;
 
-/// This many drops of whitewater are assumed for each particle of a frame of which nothing is known.
+/// Number of drops of whitewater per particle, assumed for frames that were not surveyed.
 const DROPS_PER_PARTICLE: u64 = 8;
 
 impl MemoryModel<'_> {

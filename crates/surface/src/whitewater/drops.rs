@@ -21,7 +21,7 @@ const DIMENSIONS: u32 = 5;
 /// that no gaps are between the drops of neighbours.
 const SPREAD: f32 = 2.2;
 
-/// The same for particles that are nothing but spray, most of which is nearer; tuned by eye.
+/// The same for particles that have become spray, most of whose drops are closer; tuned by eye.
 const SPRAY_SPREAD: f32 = 4.5;
 
 /// Least, mean and greatest radius of spray in radii of the particle; tuned by eye.

@@ -122,7 +122,7 @@ impl Whitewater {
 
     /// The same with about so many drops at most.
     fn at_most(most: usize, flow: Flow<'_>, settings: WhitewaterSettings) -> Self {
-        // A speed that is no number has no whitewater
+        // There is no whitewater if the speed is zero or NaN
         if !(settings.speed > 0.0 && settings.amount > 0.0) || flow.centers.is_empty() {
             return Self::default();
         }
