@@ -48,7 +48,7 @@ section! {
         ///
         /// The samples of a pixel are distributed like the filter and have equal weights. A single sample is at the
         /// centre of the pixel.
-        filter: FilterKind = FilterKind::Box;
+        filter: FilterKind = FilterKind::BlackmanHarris;
         /// Width of the pixel filter in pixels
         filter_width: Option<f32> = None, above(0), to(MAX_FILTER_WIDTH), unit("a number of pixels"),
             example("2.0"), unset("1 for box, 2 for gaussian, 3 for blackman-harris");
