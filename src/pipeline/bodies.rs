@@ -113,7 +113,7 @@ fn median_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
 }
 
 /// Bytes that a surface may use: within the limit of the job, and free.
-fn memory_left(limit: Option<u64>) -> Option<u64> {
+pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
     let used = MemoryUse::now().anonymous;
     let of_limit = limit.map(|limit| limit.saturating_sub(used));
     match (of_limit, available()) {

@@ -11,6 +11,7 @@ use spherule_formats::ParticleFrame;
 mod arrows;
 mod bodies;
 mod bonds;
+mod clumps;
 mod decoded;
 mod denoise;
 mod encode;

@@ -9,6 +9,7 @@ use glam::Vec3;
 use spherule_formats::Radius;
 
 use super::bodies::{BodyParticles, build_grid, radius_of, shading_normals};
+use super::clumps::take_clumps;
 use super::decoded::DecodedFrame;
 use super::meshes::{MeshSlices, MeshThing};
 use super::motion::expose;
@@ -22,6 +23,7 @@ use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure,
 use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render_into};
 use crate::report::FrameReport;
 use crate::scene::Scene;
+use crate::surface::clumps::{MovingClumps, SurfaceWithClumps};
 use crate::surface::cut::{ConvexRegion, CutSpheres};
 use crate::surface::mesh::{MeshSurface, MeshTree};
 use crate::surface::moving::MovingSpheres;
@@ -48,6 +50,8 @@ pub(super) struct SurfaceBuilder {
     owners: Vec<u32>,
     /// A smooth surface, for each slice of the exposure.
     smooth: Vec<SmoothGrid>,
+    /// What flies fast and apart from it, with motion blur.
+    clumps: MovingClumps,
     /// Trees of a union, for each slice of the exposure; empty without motion blur.
     unions: Vec<TreeBuilder>,
     /// By how far the spheres of the body move, until their moving tree is built.
@@ -187,7 +191,12 @@ impl SurfaceBuilder {
         notes: &mut Vec<String>,
     ) -> Result<SmoothReport, SmoothError> {
         let settings = &setup.picture.surface;
-        let mut made = SmoothReport::default();
+        // Bodies that touch have one surface, which is not divided
+        let (clumps, mut made) = match self.styles.prior() {
+            [] => take_clumps(setup, frame, &mut self.displacements)?,
+            _ => Default::default(),
+        };
+        self.clumps = clumps;
         let first_note = notes.len();
         self.build_slices(setup, frame, |this, frame| {
             let mut grid = SmoothGrid::default();
@@ -359,7 +368,12 @@ impl SurfaceBuilder {
             (SurfaceKind::Smooth, false) => Box::new(self.smooth[0].surface()),
             (SurfaceKind::Smooth, true) => {
                 let surfaces = self.smooth.iter().map(SmoothGrid::surface);
-                Box::new(SlicedSurface::new(surfaces.collect(), true))
+                let slices = SlicedSurface::new(surfaces.collect(), true);
+                if self.clumps.is_empty() {
+                    Box::new(slices)
+                } else {
+                    Box::new(SurfaceWithClumps::new(slices, &self.clumps))
+                }
             }
         }
     }

@@ -407,3 +407,41 @@ fn motion_blur_without_velocities_takes_the_next_frame() {
         assert!(errors.contains(what), "{errors}");
     }
 }
+
+// A drop that flies past others, which do not move, is a streak. A union is a row of eight copies.
+#[test]
+fn fast_drops_of_smooth_surfaces_leave_streaks() {
+    let workshop = Workshop::new();
+    for (number, x) in (1..).zip(["-0.7", "0.7"]) {
+        // Those at the ends are far apart: what moves by half of the extent has left a periodic box
+        let still = "8 0 0.4 0\n9 -2 0 0\n10 2 0 0";
+        let text = format!("4\nProperties=id:I:1:pos:R:3\n7 {x} 0 0\n{still}\n");
+        fs::write(workshop.join(format!("f_{number}.xyz")), text).expect("a file");
+    }
+    let settings = [
+        "camera.eye=[0,0,2]",
+        "camera.look_at=[0,0,0]",
+        "camera.up=[0,1,0]",
+        "camera.shutter=1",
+        "camera.shutter_offset=0",
+        "output.transparent=true",
+    ];
+    // Least and greatest coverage in the middle of the way
+    let coverage = |surface: &str| {
+        let output = format!("{surface}/f.####.exr");
+        let mut all = vec!["render", "f_*.xyz", "-o", &output, "--surface", surface];
+        all.extend(["--frames", "1", "--size", "64x36", "--samples", "400", "--radius", "0.05"]);
+        all.extend(settings.iter().flat_map(|setting| ["--set", *setting]));
+        all.extend(["--ground=none", "--set", "material.type=matte"]);
+        workshop.run(&all).expect(0);
+        let picture = Picture::open(&workshop.join(output.replace("####", "0001")));
+        let plane = picture.floats("A");
+        let column = |x: usize| (15..21).map(|y| plane[y * 64 + x]).sum::<f32>();
+        let columns = (22..42).map(column);
+        (columns.clone().fold(f32::MAX, f32::min), columns.fold(0.0, f32::max))
+    };
+    let (least, greatest) = coverage("smooth");
+    assert!(greatest < 0.5 && least > 0.7 * greatest, "{least} {greatest}");
+    let (least, greatest) = coverage("union");
+    assert!(least < 0.4 * greatest, "{least} {greatest}");
+}

@@ -13,7 +13,8 @@
 //! - [`smooth`]: the isosurface of the [`field`](mod@field) of particles, on a sparse grid.
 //! - [`grains`]: ellipsoids, superquadrics, capsules, cylinders, cuboids and meshes with a place and orientation each.
 //! - [`mesh`], [`rods`] and the ground [`Plane`].
-//! - [`slices`]: a surface that changes during the exposure, as one per motion segment.
+//! - [`slices`]: a surface that changes during the exposure, as one per motion segment. [`clumps`]: what is apart from it
+//!   and moves continuously.
 //! - [`PcaNormals`], [`GradientNormals`]: normals of a fluid for its spheres. [`OwnedBody`], [`SphereOwners`]: the
 //!   particles of a shape among those of a frame. [`contact`]: where the fluid touches the ground.
 //!
@@ -48,6 +49,7 @@
 //! ```
 #![deny(unsafe_code)]
 
+pub mod clumps;
 pub mod contact;
 pub mod cut;
 pub mod field;

@@ -121,6 +121,15 @@ impl SmoothSurface<'_> {
     fn field(&self) -> Option<&FieldParticles> {
         self.built.field.as_ref()
     }
+
+    /// The particle nearest to `point`, if particles are kept and one is within the support.
+    pub(crate) fn nearest_particle(&self, point: Vec3) -> Option<u32> {
+        let field = self.field()?;
+        match self.built.own {
+            Some(count) => field.nearest_of(point, count),
+            None => field.nearest(point),
+        }
+    }
 }
 
 impl Shape for SmoothSurface<'_> {
@@ -165,11 +174,7 @@ impl Shape for SmoothSurface<'_> {
     }
 
     fn particle_at(&self, hit: &Intersection) -> u32 {
-        let nearest = self.field().and_then(|field| match self.built.own {
-            Some(count) => field.nearest_of(hit.point, count),
-            None => field.nearest(hit.point),
-        });
-        nearest.unwrap_or(hit.particle)
+        self.nearest_particle(hit.point).unwrap_or(hit.particle)
     }
 
     fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
