@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use spherule_formats::Radius;
+use spherule_frame::gather::keep;
 
 use super::bodies::{common_radius, memory_left};
 use super::decoded::DecodedFrame;
@@ -39,18 +40,10 @@ pub(super) fn take_clumps(
     // Build their surface, and leave the others
     let left = memory_left(setup.run.memory_limit);
     let (clumps, made) = MovingClumps::build(found, &particles, settings, left)?;
-    keep(frame.centers.to_mut(), clumps.rest());
-    keep(displacements, clumps.rest());
+    keep(frame.centers.to_mut(), 1, clumps.rest());
+    keep(displacements, 1, clumps.rest());
     if let Radius::PerParticle(radii) = &mut frame.radius {
-        keep(radii, clumps.rest());
+        keep(radii, 1, clumps.rest());
     }
     Ok((clumps, made))
-}
-
-/// Leaves the `items` with these `numbers`, which ascend.
-fn keep<T: Copy>(items: &mut Vec<T>, numbers: &[u32]) {
-    for (place, number) in numbers.iter().enumerate() {
-        items[place] = items[*number as usize];
-    }
-    items.truncate(numbers.len());
 }

@@ -73,7 +73,7 @@ pub fn slice_at(time: f32, count: usize) -> usize {
 }
 
 /// `rays` with all rays but those of `lanes` disabled.
-fn only(rays: &RayPacket, lanes: u32) -> RayPacket {
+pub(super) fn only(rays: &RayPacket, lanes: u32) -> RayPacket {
     let mut rest = *rays;
     rest.keep_only(lanes);
     rest

@@ -7,9 +7,9 @@ use glam::Vec3;
 use crate::field::FieldParticles;
 use spherule_tree::order::index_u32;
 
-/// Particles within this distance belong together, in supports of the kernel. With the default threshold, the surfaces of
-/// two particles meet up to 0.95, but thin bridges are not missed in what is blurred; with 1, torn tongues of water are
-/// seldom apart from the rest. Neighbours in water are 0.5 apart.
+/// Particles within this distance are linked, in supports of the kernel; neighbours in water are 0.5 apart. With the
+/// default threshold, the surfaces of two particles merge up to 0.95, but motion blur hides such thin bridges. With 1, most
+/// torn tongues of water were linked to the body.
 const LINK: f32 = 0.75;
 
 /// Larger clumps are not looked for: they are waves and sheets, whose parts move in different ways.
@@ -53,13 +53,13 @@ pub(super) struct FastClump {
     pub(super) motion: Vec3,
 }
 
-/// What is known of a particle.
+/// State of a particle in the search for connected components.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Place {
-    Unknown,
-    /// In a clump, or in the one that is being searched.
+enum Label {
+    Unvisited,
+    /// In a clump, or in the component that is being searched.
     Clump,
-    /// In what is drawn in slices.
+    /// In the part of the surface that is drawn in slices.
     Rest,
 }
 
@@ -78,13 +78,13 @@ impl FastClumps {
             return found;
         }
         // A clump with a slow particle is none
-        let place = |motion| if is_fast(motion) { Place::Unknown } else { Place::Rest };
-        let mut places: Vec<Place> = motions.iter().map(place).collect();
+        let label = |motion| if is_fast(motion) { Label::Unvisited } else { Label::Rest };
+        let mut labels: Vec<Label> = motions.iter().map(label).collect();
         let field = FieldParticles::sorted(particles.centers, LINK * particles.support, true);
-        for first in 0..places.len() {
-            if places[first] == Place::Unknown {
-                let (members, is_whole) = connected(&field, particles.centers, first, &mut places);
-                found.add(&members, is_whole, motions, &mut places);
+        for first in 0..labels.len() {
+            if labels[first] == Label::Unvisited {
+                let (members, is_whole) = connected(&field, particles.centers, first, &mut labels);
+                found.add(&members, is_whole, motions, &mut labels);
             }
         }
         found
@@ -105,7 +105,7 @@ impl FastClumps {
     }
 
     /// Adds the clump of `members` if it `is_whole` and they move alike, and leaves it to the rest otherwise.
-    fn add(&mut self, members: &[u32], is_whole: bool, motions: &[Vec3], places: &mut [Place]) {
+    fn add(&mut self, members: &[u32], is_whole: bool, motions: &[Vec3], labels: &mut [Label]) {
         let motion_of = |member: &u32| motions[*member as usize];
         let motion = members.iter().map(motion_of).sum::<Vec3>() / members.len() as f32;
         let spread = MAX_SPREAD * motion.length();
@@ -114,7 +114,7 @@ impl FastClumps {
             self.particles.extend_from_slice(members);
             self.clumps.push(FastClump { range: start..self.particles.len(), motion });
         } else {
-            members.iter().for_each(|member| places[*member as usize] = Place::Rest);
+            members.iter().for_each(|member| labels[*member as usize] = Label::Rest);
         }
     }
 }
@@ -125,20 +125,20 @@ fn connected(
     field: &FieldParticles,
     centers: &[Vec3],
     first: usize,
-    places: &mut [Place],
+    labels: &mut [Label],
 ) -> (Vec<u32>, bool) {
     let mut members = vec![index_u32(first)];
-    places[first] = Place::Clump;
+    labels[first] = Label::Clump;
     let (mut next, mut is_whole) = (0, true);
     while is_whole && next < members.len() {
         field.each_offset(centers[members[next] as usize], |other, _| {
-            match places[other as usize] {
-                Place::Unknown => {
-                    places[other as usize] = Place::Clump;
+            match labels[other as usize] {
+                Label::Unvisited => {
+                    labels[other as usize] = Label::Clump;
                     members.push(other);
                 }
-                Place::Clump => {}
-                Place::Rest => is_whole = false,
+                Label::Clump => {}
+                Label::Rest => is_whole = false,
             }
         });
         is_whole &= members.len() <= MAX_PARTICLES;

@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::shape::crossing_of_packet;
-use super::slices::SlicedSurface;
+use super::slices::{SlicedSurface, only};
 use super::smooth::{SmoothError, SmoothGrid, SmoothReport, SmoothSurface};
 use super::{Intersection, Intersections, MaterialId, Shape, Side, SurfaceSettings};
 use spherule_tree::accel::moving::MovingTree;
@@ -250,8 +250,7 @@ impl Shape for SurfaceWithClumps<'_> {
             around[lane] = self.clumps.around_origin(rays, lane);
             in_clumps |= u32::from(around[lane].is_some()) << lane;
         }
-        let mut rest = *rays;
-        rest.keep_only(all & !in_clumps);
+        let mut rest = only(rays, all & !in_clumps);
         self.slices.intersect(&mut rest, coherence, inside & !in_clumps, hits);
         for lane in lanes_in(all & !in_clumps) {
             rays.t_max[lane] = rest.t_max[lane];
