@@ -13,8 +13,8 @@ use flate2::write::GzEncoder;
 use super::AWAY;
 use crate::harness::{Ran, Workshop, ledger};
 
-/// Data of the process in KiB: a third of what the bomb takes as text, a fifteenth as numbers.
-const ALLOWED: usize = 96 << 10;
+/// Data of the process in KiB: half of what the bomb takes as text, a quarter as numbers.
+const ALLOWED: usize = 64 << 10;
 
 const SMALL: [&str; 8] = ["--width", "32", "--height", "18", "--samples", "1", "--threads", "2"];
 
@@ -31,7 +31,7 @@ fn frames(dir: &Path) {
     let good = |frame: usize| format!("x,y,z\n0,0,0\n1,0,{frame}\n0,1,0\n");
     let piece = gz("1,2,3\n".repeat(1 << 20).as_bytes());
     let mut bomb = gz(b"x,y,z\n");
-    (0..48).for_each(|_| bomb.extend(&piece));
+    (0..20).for_each(|_| bomb.extend(&piece));
     bomb.extend(gz(b"1,2,3\n"));
     assert!(bomb.len() < 1 << 19, "{} bytes", bomb.len());
     for (frame, bytes) in [(1, gz(good(1).as_bytes())), (2, bomb), (3, gz(good(3).as_bytes()))] {
@@ -39,9 +39,9 @@ fn frames(dir: &Path) {
     }
 }
 
-/// Runs the program with little memory.
-fn limited(workshop: &Workshop, arguments: &[&str]) -> Ran {
-    let script = format!("ulimit -d {ALLOWED} && exec \"$0\" \"$@\"");
+/// Runs the program with so little memory for its data.
+fn limited(workshop: &Workshop, kibibytes: usize, arguments: &[&str]) -> Ran {
+    let script = format!("ulimit -d {kibibytes} && exec \"$0\" \"$@\"");
     let output = Command::new("sh")
         .current_dir(workshop.path())
         .args(["-c", &script, env!("CARGO_BIN_EXE_spherule")])
@@ -54,13 +54,13 @@ fn limited(workshop: &Workshop, arguments: &[&str]) -> Ran {
 fn a_bomb_costs_one_frame() {
     for options in [
         &[][..],
-        &["--memory-limit", "64MiB"],
-        &["--memory-limit", "64MiB", "--isolate", "--memory-ceiling", "64MiB"],
+        &["--memory-limit", "48MiB"],
+        &["--memory-limit", "48MiB", "--isolate", "--memory-ceiling", "48MiB"],
     ] {
         let workshop = Workshop::new();
         frames(&workshop.join("in"));
         let render = ["render", "in", "-o", "out/f.####.exr", "--radius", "0.1"];
-        let ran = limited(&workshop, &[&render[..], &SMALL, &AWAY, options].concat())
+        let ran = limited(&workshop, ALLOWED, &[&render[..], &SMALL, &AWAY, options].concat())
             .expect(1)
             .prints("f_2.csv.gz: its numbers in memory are larger than")
             .prints("failed: 2");
@@ -76,23 +76,23 @@ fn check_and_inspect_name_a_bomb() {
     let workshop = Workshop::new();
     frames(&workshop.join("in"));
     let check = ["check", "in", "-o", "out/f.####.exr"];
-    let ran = limited(&workshop, &[&check[..], &SMALL, &AWAY].concat());
+    let ran = limited(&workshop, ALLOWED, &[&check[..], &SMALL, &AWAY].concat());
     assert!(matches!(ran.code(), Some(0 | 1)), "{}", ran.errors());
-    let ran = limited(&workshop, &["inspect", "in"]).expect(1);
+    let ran = limited(&workshop, ALLOWED, &["inspect", "in"]).expect(1);
     let output = ran.text() + &ran.errors();
     assert!(output.contains("f_2.csv.gz") && output.contains("larger than"), "{output}");
 }
 
-/// The text of 400 000 particles in numbers of so many digits that it takes 80 MB, twenty times of what they take.
+/// The text of 200 000 particles in numbers of so many digits that it takes 40 MB, twenty times of what they take.
 fn wide_rows(prefix: &str) -> String {
     let number = "0".repeat(66) + "1.5";
-    format!("{prefix}{number} {number} {number}\n").repeat(400_000)
+    format!("{prefix}{number} {number} {number}\n").repeat(200_000)
 }
 
-// Four formats of 80 MB of text or more: less would fit into the memory as a whole.
+// Four formats of 40 MB of text or more: less would fit into the memory as a whole.
 #[test]
 fn compressed_text_is_streamed() {
-    let count = 400_000;
+    let count = 200_000;
     let ply = format!(
         "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
          property float z\nend_header\n"
@@ -112,8 +112,8 @@ fn compressed_text_is_streamed() {
         let workshop = Workshop::new();
         fs::write(workshop.join(name), gz(text.as_bytes())).expect("a file");
         drop(text);
-        let ran = limited(&workshop, &["inspect", name, "--json"]).expect(0);
-        assert!(ran.text().contains("400000"), "{name}: {}", ran.text());
+        let ran = limited(&workshop, 48 << 10, &["inspect", name, "--json"]).expect(0);
+        assert!(ran.text().contains("200000"), "{name}: {}", ran.text());
     }
 }
 
