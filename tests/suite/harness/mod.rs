@@ -20,6 +20,10 @@ pub(crate) use running::Running;
 /// Images that take a few milliseconds.
 pub(crate) const SMALL: [&str; 6] = ["--width", "64", "--height", "36", "--samples", "1"];
 
+/// The same for jobs in whose tests light does not matter: that of a studio takes longer than such an image.
+pub(crate) const JOB: [&str; 8] =
+    [SMALL[0], SMALL[1], SMALL[2], SMALL[3], SMALL[4], SMALL[5], "--integrator", "whitted"];
+
 /// A directory for one test, and the program to run in it.
 pub(crate) struct Workshop {
     dir: TempDir,
@@ -61,7 +65,7 @@ impl Workshop {
     /// Renders `in` to small images in another directory.
     pub(crate) fn render_to(&self, out: &str, options: &[&str]) -> Ran {
         let pattern = format!("{out}/f.####.exr");
-        let arguments = [&["render", "in", "-o", &pattern][..], &SMALL, options].concat();
+        let arguments = [&["render", "in", "-o", &pattern][..], &JOB, options].concat();
         self.run(&arguments)
     }
 

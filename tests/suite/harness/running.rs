@@ -55,8 +55,8 @@ impl Running {
         }
     }
 
-    /// Waits until `holds`, at the latest until the program ends. Looks without pause: the moment
-    /// counts.
+    /// Waits until `holds`, at the latest until the program ends. Looks ten times in a millisecond: the moment counts, but
+    /// the program needs the processor, too.
     pub(crate) fn wait_until(&mut self, holds: impl Fn() -> bool) -> bool {
         let deadline = Instant::now() + DEADLINE;
         loop {
@@ -67,7 +67,7 @@ impl Running {
             if !matches!(self.child.try_wait(), Ok(None)) {
                 return false;
             }
-            thread::yield_now();
+            thread::sleep(Duration::from_micros(100));
         }
     }
 

@@ -5,11 +5,11 @@ use std::fs;
 use serde_json::json;
 
 use super::answer;
-use crate::harness::{Ran, SMALL, Workshop, dam_break, files, stamps};
+use crate::harness::{JOB, Ran, Workshop, dam_break, files, stamps};
 
 fn check(workshop: &Workshop, options: &[&str]) -> Ran {
     let arguments = ["check", "in", "-o", "out/f.####.exr"];
-    workshop.run(&[&arguments[..], &SMALL, options].concat())
+    workshop.run(&[&arguments[..], &JOB, options].concat())
 }
 
 fn frames() -> Workshop {

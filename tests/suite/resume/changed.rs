@@ -4,7 +4,7 @@
 
 use std::fs;
 
-use crate::harness::{Ran, SMALL, Workshop, dam_break, images, ledger, stamps};
+use crate::harness::{JOB, Ran, Workshop, dam_break, images, ledger, stamps};
 
 /// As a shell gives them for `in/*`.
 const FIVE: [&str; 5] = ["in/f_1.bgeo", "in/f_2.bgeo", "in/f_3.bgeo", "in/f_4.bgeo", "in/f_5.bgeo"];
@@ -37,7 +37,7 @@ fn the_same_command_again_does_nothing() {
     nothing(workshop.run(&["render", "./out/../out/job.toml"]));
     let absolute = workshop.join("in").display().to_string();
     for input in [&[absolute.as_str()][..], &["in/f_#.bgeo"], &FIVE] {
-        let arguments = [&["render"], input, &["-o", "out/f.####.exr"], &SMALL].concat();
+        let arguments = [&["render"], input, &["-o", "out/f.####.exr"], &JOB].concat();
         nothing(workshop.run(&arguments));
     }
     let after = stamps(&out);
@@ -94,15 +94,15 @@ fn changed_settings_are_refused_with_old_and_new_value() {
 fn force_starts_over() {
     let workshop = five_frames();
     workshop.render(&[]).expect(0);
-    workshop.render_to("fresh", &["--bounces", "0"]).expect(0);
+    workshop.render_to("fresh", &["--max-depth", "1"]).expect(0);
     let old = images(&workshop.join("out"));
-    let ran = workshop.render(&["--bounces", "0", "--force"]).expect(0);
+    let ran = workshop.render(&["--max-depth", "1", "--force"]).expect(0);
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
     let new = images(&workshop.join("out"));
     assert!(new != old && new == images(&workshop.join("fresh")));
     assert_eq!(ledger(&workshop.join("out")).lines.len(), 5);
-    workshop.render(&[]).expect(2).prints("render.bounces: 0 -> 6");
-    workshop.render(&["--bounces", "0"]).expect(0).prints("5 of 5 frames are done already");
+    workshop.render(&[]).expect(2).prints("render.max_depth: 1 -> 3");
+    workshop.render(&["--max-depth", "1"]).expect(0).prints("5 of 5 frames are done already");
 }
 
 #[test]

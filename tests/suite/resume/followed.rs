@@ -5,13 +5,13 @@
 use std::fs;
 use std::path::Path;
 
-use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
+use crate::harness::{JOB, Workshop, dam_break, images, ledger, no_leftovers};
 
 const QUICK: [&str; 3] = ["--follow", "--settle", "0.3"];
 
 fn arguments<'a>(options: &[&'a str]) -> Vec<&'a str> {
     let render = ["render", "in", "-o", "out/f.####.exr"];
-    [&render[..], &SMALL, &QUICK, options].concat()
+    [&render[..], &JOB, &QUICK, options].concat()
 }
 
 /// The bytes of a frame of the example.
@@ -46,7 +46,7 @@ fn frames_are_rendered_as_they_come_until_the_stop_file_appears() {
     let render = ["render", "in", "-o", "whole/f.####.exr"];
     fs::rename(&input, workshop.join("later")).expect("a directory");
     fs::rename(workshop.join("first"), &input).expect("a directory");
-    let render = [&render[..], &SMALL].concat();
+    let render = [&render[..], &JOB].concat();
     workshop.run(&render).expect(0);
     fs::remove_dir_all(&input).expect("a directory");
     fs::rename(workshop.join("later"), &input).expect("a directory");
@@ -163,7 +163,7 @@ fn a_frame_that_grew_between_two_runs_is_rendered_again() {
     // What is cleared away has been rendered, and stays.
     fs::remove_file(workshop.join("in/f_1.bgeo")).expect("a file");
 
-    let plainly = [&["render", "in", "-o", "out/f.####.exr"][..], &SMALL].concat();
+    let plainly = [&["render", "in", "-o", "out/f.####.exr"][..], &JOB].concat();
     workshop
         .run(&plainly)
         .expect(2)

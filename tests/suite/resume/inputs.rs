@@ -5,7 +5,7 @@ use std::fs;
 use crate::harness::{Workshop, dam_break, images, ledger, no_leftovers};
 
 const FRAMES: usize = 9;
-const LONG: [&str; 10] = [
+const LONG: [&str; 12] = [
     "render",
     "in",
     "-o",
@@ -16,6 +16,8 @@ const LONG: [&str; 10] = [
     "180",
     "--samples",
     "12",
+    "--integrator",
+    "whitted",
 ];
 
 // Images take a while, so that the last inputs change before they are read; most are rendered three times.

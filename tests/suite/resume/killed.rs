@@ -1,17 +1,18 @@
 //! SIGKILL at any moment loses at most the frames in progress, with one worker and with several.
 //!
-//! Fifty processes are killed in each test: moments such as that of writing an image come several times.
+//! Thirty processes are killed in each test: moments such as that of writing an image come several times.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use glam::Vec3;
+
 use crate::harness::{
-    Running, SMALL, Workshop, dam_break, files, images, ledger, ledger_paths, no_leftovers,
+    JOB, Running, Workshop, files, images, ledger, ledger_paths, no_leftovers, npy,
 };
 
-const FRAMES: usize = 60;
-const KILLS: usize = 50;
+const FRAMES: usize = 36;
 
 /// When to kill.
 #[derive(Debug, Clone, Copy)]
@@ -60,25 +61,34 @@ type Files = BTreeMap<String, Vec<u8>>;
 
 #[test]
 fn killed_again_and_again_the_result_is_that_of_an_unbroken_run() {
-    torture(1);
+    torture(1, 30);
 }
 
 #[test]
 fn several_workers_killed_again_and_again_make_what_one_makes() {
-    torture(4);
+    torture(4, 30);
+}
+
+#[test]
+#[ignore = "takes half a minute"]
+fn two_hundred_kills_lose_nothing() {
+    torture(1, 100);
+    torture(4, 100);
 }
 
 /// Lets `workers` processes work in one directory, kills one after the other and starts another in its
-/// place.
-fn torture(workers: usize) {
+/// place, until so many are killed.
+fn torture(workers: usize, enough: usize) {
     let workshop = Workshop::new();
-    dam_break(&workshop.join("in"), 1..=FRAMES);
+    for (frame, seed) in (1..=FRAMES).zip(1..) {
+        npy(&workshop.join(format!("in/f_{frame}.npy")), 1_000, seed, Vec3::ZERO);
+    }
     workshop.render_to("whole", &[]).expect(0);
     let whole = images(&workshop.join("whole"));
     assert_eq!(whole.len(), 2 * FRAMES);
 
     let out = workshop.join("out");
-    let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &SMALL].concat();
+    let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &JOB].concat();
     let mut team: Vec<Running> = Vec::new();
     let mut kills = 0;
     let moments = FIRST.into_iter().chain(LATER.into_iter().cycle());
@@ -99,7 +109,7 @@ fn torture(workers: usize) {
             done += 1;
         }
         all_is_whole(&out, &whole, moment);
-        if kills >= KILLS {
+        if kills >= enough {
             break;
         }
         if images(&out).len() == whole.len() {
@@ -108,7 +118,7 @@ fn torture(workers: usize) {
             lose_some(&out, kills);
         }
     }
-    assert!(kills >= KILLS && done < 4 * KILLS, "{kills} kills, {done} ends");
+    assert!(kills >= enough && done < 4 * enough, "{kills} kills, {done} ends");
     finish(team);
     workshop.run(&arguments).expect(0);
 

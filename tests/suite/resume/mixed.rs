@@ -3,11 +3,11 @@
 
 use std::fs;
 
-use crate::harness::{SMALL, Workshop, dam_break, files, images};
+use crate::harness::{JOB, Workshop, dam_break, files, images};
 
 /// Renders `input` to the images of `out`.
 fn render(workshop: &Workshop, input: &str, options: &[&str]) -> crate::harness::Ran {
-    let arguments = [&["render", input, "-o", "out/f.####.exr"][..], &SMALL, options];
+    let arguments = [&["render", input, "-o", "out/f.####.exr"][..], &JOB, options];
     workshop.run(&arguments.concat())
 }
 
@@ -54,7 +54,7 @@ fn another_simulation_does_not_join_a_job() {
     }
     let check = ["check", "other", "-o", "out/f.####.exr"];
     workshop
-        .run(&[&check[..], &SMALL].concat())
+        .run(&[&check[..], &JOB].concat())
         .expect(2)
         .prints("out: this job was made from other files (");
     assert!(files(&workshop.join("out")) == before);
@@ -71,7 +71,7 @@ fn relative_paths_are_reported_apart_by_where_they_begin() {
     dam_break(&workshop.join("a/dump"), 1..=2);
     later_frames(&workshop, "b/dump", 3);
     let render = |dir: &str| {
-        let arguments = [&["render", "dump", "-o", "../out/f.####.exr"][..], &SMALL].concat();
+        let arguments = [&["render", "dump", "-o", "../out/f.####.exr"][..], &JOB].concat();
         let mut command = workshop.command(&arguments);
         command.current_dir(workshop.join(dir));
         crate::harness::Ran(command.output().expect("the program starts"))
@@ -165,7 +165,7 @@ fn files_that_no_job_made_are_not_replaced() {
         }
         let check = ["check", "in", "-o", "out/f.####.exr"];
         workshop
-            .run(&[&check[..], &SMALL].concat())
+            .run(&[&check[..], &JOB].concat())
             .expect(2)
             .prints(&format!("out/{name}: already exists"));
         let left = files(&workshop.join("out"));

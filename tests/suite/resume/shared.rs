@@ -4,12 +4,12 @@
 
 use std::fs;
 
-use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
+use crate::harness::{JOB, Workshop, dam_break, images, ledger, no_leftovers};
 
 const FRAMES: usize = 12;
 
 fn arguments<'a>(options: &[&'a str]) -> Vec<&'a str> {
-    [&["render", "in", "-o", "out/f.####.exr"][..], &SMALL, options].concat()
+    [&["render", "in", "-o", "out/f.####.exr"][..], &JOB, options].concat()
 }
 
 /// A workshop with the images of an unbroken run in `whole`.
@@ -83,7 +83,7 @@ fn frames_of_an_unresponsive_worker_are_taken_over() {
     fs::hard_link(work.join("far-7-00.worker"), work.join("frame.2.0")).expect("a link");
     fs::write(workshop.join("out/.f.0002.exr.far-7-00.3.part"), "half").expect("a file");
     let ran = workshop
-        .run(&arguments(&["--takeover-after", "6"]))
+        .run(&arguments(&["--takeover-after", "4"]))
         .expect(0)
         .prints("waiting for frame 2: process 7 on far is working on it");
     assert_eq!(ran.rendered().last(), Some(&2));
@@ -120,7 +120,7 @@ fn a_job_of_an_unresponsive_worker_starts_over() {
 #[test]
 fn a_worker_that_was_declared_dead_stops_and_may_rejoin() {
     let workshop = with_whole();
-    let slow = ["--samples", "64", "--width", "640", "--height", "360"];
+    let slow = ["--samples", "16", "--width", "640", "--height", "360"];
     let arguments = [&["render", "in", "-o", "slow/f.####.exr"][..], &slow].concat();
     let arguments = [&arguments[..], &["--takeover-after", "0.1"]].concat();
     let mut running = workshop.start(&arguments);

@@ -1,6 +1,6 @@
 //! The same bytes whoever renders them.
 
-use crate::harness::{SMALL, Workshop, dam_break, images, sample};
+use crate::harness::{JOB, Workshop, dam_break, images, sample};
 
 /// Everything that could depend on order: several samples, reflection, refraction, ground.
 const RICH: [&str; 8] = [
@@ -63,7 +63,7 @@ fn the_place_of_input_and_output_does_not_matter() {
     here.render(&[]).expect(0);
     let input = there.join("deeper/data");
     let input = input.to_str().expect("UTF-8");
-    let arguments = [&["render", input, "-o", "f.####.exr"][..], &SMALL].concat();
+    let arguments = [&["render", input, "-o", "f.####.exr"][..], &JOB].concat();
     there.run(&arguments).expect(0);
     assert!(images(&here.join("out")) == images(there.path()));
 }
@@ -73,7 +73,7 @@ fn a_file_with_many_steps_is_resumed_too() {
     let workshop = Workshop::new();
     let input = sample("lammps_drop/drop_2frames.lammpstrj");
     let input = input.to_str().expect("UTF-8");
-    let arguments = [&["render", input, "-o", "out/f.####.exr"][..], &SMALL].concat();
+    let arguments = [&["render", input, "-o", "out/f.####.exr"][..], &JOB].concat();
     let first = workshop.run(&arguments).expect(0).rendered();
     assert_eq!(first.len(), 2);
     let whole = images(&workshop.join("out"));
