@@ -314,7 +314,7 @@ fn focus_follows_a_particle_through_the_frames() {
 #[test]
 fn motion_blur_moves_particles_with_their_velocities() {
     let workshop = Workshop::new();
-    dam_break(&workshop.join("in"), 3..=4);
+    dam_break(&workshop.join("in"), 3..=3);
     let blur = ["--set", "camera.shutter=0.5", "--set", "output.frame_time=0.1"];
     let render = |out: &str, options: &[&str]| {
         let output = format!("{out}/f.####.exr");

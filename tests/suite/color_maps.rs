@@ -36,6 +36,8 @@ fn render(shop: &Workshop, input: &str, options: &[&str]) -> Ran {
         "--force",
         "--channels",
         "RGBA,albedo,P",
+        "--integrator",
+        "whitted",
         "--set",
         "camera.mode=fixed",
         "--set",

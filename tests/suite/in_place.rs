@@ -87,7 +87,7 @@ fn bodies_and_smooth_normals_are_those_of_decoded_particles() {
     }
     // Whatever the structure, that sorts a copy.
     shop.run(&[&["convert", "in", "-o", "smooth"][..], &options].concat()).expect(0);
-    let photons = ["--set", "render.caustics={photons=20000}"];
+    let photons = ["--set", "render.caustics={photons=5000}"];
     let smooth = [&["--look", "water", "--color-by", "velocity"][..], &photons].concat();
     same_in_all_ways(&shop, "smooth", &smooth, |_| true);
 }

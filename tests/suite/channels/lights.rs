@@ -82,7 +82,8 @@ fn light_channels_of_path_add_up() {
     }
     let metal = ["--set", "material.type=\"metal\"", "--set", "output.transparent=true"];
     check(&workshop, &[&studio[..], &metal].concat(), &["specular"]);
-    let water = ["--look", "water"];
+    // Few photons: they add light that is diffuse, however many
+    let water = ["--look", "water", "--set", "render.caustics={photons=20000}"];
     // Wet ground is glossy
     let clear = ["diffuse", "specular", "reflection", "refraction", "background"];
     check(&workshop, &[&water[..], &PATH].concat(), &clear);
