@@ -65,7 +65,11 @@ impl Workshop {
     /// Renders `in` to small images in another directory.
     pub(crate) fn render_to(&self, out: &str, options: &[&str]) -> Ran {
         let pattern = format!("{out}/f.####.exr");
-        let arguments = [&["render", "in", "-o", &pattern][..], &JOB, options].concat();
+        // Who chooses what renders gets just that
+        let choices = ["--integrator", "--look", "--device", "--gpu"];
+        let is_choice = |option: &&str| choices.iter().any(|choice| option.starts_with(choice));
+        let images = if options.iter().any(is_choice) { &SMALL[..] } else { &JOB };
+        let arguments = [&["render", "in", "-o", &pattern][..], images, options].concat();
         self.run(&arguments)
     }
 

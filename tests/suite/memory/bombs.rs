@@ -112,7 +112,7 @@ fn compressed_text_is_streamed() {
         let workshop = Workshop::new();
         fs::write(workshop.join(name), gz(text.as_bytes())).expect("a file");
         drop(text);
-        let ran = limited(&workshop, 48 << 10, &["inspect", name, "--json"]).expect(0);
+        let ran = limited(&workshop, 32 << 10, &["inspect", name, "--json"]).expect(0);
         assert!(ran.text().contains("200000"), "{name}: {}", ran.text());
     }
 }
