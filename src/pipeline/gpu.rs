@@ -286,8 +286,8 @@ fn bytes_of_color(setup: &Setup) -> u64 {
 pub fn device_bytes(setup: &Setup, sequence: &Sequence, particles: u64) -> u64 {
     let picture = &setup.picture;
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
-    let of_pixels = bytes_per_pixel(&picture.scene, &picture.render) * pixels;
     let max_array = device().map_or(u64::MAX, |device| device.adapter().max_array);
+    let of_pixels = bytes_per_pixel(&picture.scene, &picture.render, max_array) * pixels;
     need_of(setup, sequence, particles, max_array).bytes(max_array)
         + bytes_of_color(setup) * particles
         + of_pixels

@@ -12,6 +12,16 @@ const STACK_PER_LEVEL: u32 = 7;
 /// Levels that the shortest stack holds. Fewer levels do not make it faster.
 const MIN_STACK_LEVELS: u32 = 6;
 
+/// Invocations in a workgroup: `GROUP` of the shaders.
+pub(crate) const GROUP: u32 = 64;
+
+/// Width and height of the tile of pixels whose camera rays are one workgroup, if `batch` samples of each are traced
+/// together: a power of two, at most [`GROUP`].
+pub(crate) const fn tile_of(batch: u32) -> [u32; 2] {
+    let bits = (GROUP / batch).ilog2();
+    [1 << bits.div_ceil(2), 1 << (bits / 2)]
+}
+
 /// Kernels for trees of one kind.
 #[derive(Debug)]
 pub(crate) struct Kernels {
@@ -19,6 +29,8 @@ pub(crate) struct Kernels {
     pub(crate) trace_camera: Kernel,
     pub(crate) trace_next: Kernel,
     pub(crate) trace_shadow: Kernel,
+    /// If pixels have several samples.
+    pub(crate) add_batch: Option<Kernel>,
     /// If indirect light has a limit.
     pub(crate) clamp_indirect: Option<Kernel>,
     /// If the picture is denoised.
@@ -58,6 +70,10 @@ pub(crate) struct Variant {
     kept_encoding: Option<Encoding>,
     /// Levels that the stack holds.
     levels: u32,
+    /// Samples of a pixel that are traced together.
+    batch: u32,
+    /// Whether these are all.
+    is_single: bool,
 }
 
 /// The sources of path tracing.
@@ -76,7 +92,12 @@ const WHITTED: [&str; 1] = [include_str!("shaders/whitted.wgsl")];
 
 impl Variant {
     /// What a picture of a tree needs.
-    pub(crate) fn of(picture: &Picture<'_>, shape: &TreeShape, has_opacity: bool) -> Self {
+    pub(crate) fn of(
+        picture: &Picture<'_>,
+        shape: &TreeShape,
+        has_opacity: bool,
+        batch: u32,
+    ) -> Self {
         let has_glass = picture.kept_rays().is_some();
         let has_mirrors = picture.ray_kinds().has_mirrors;
         assert!(!has_glass || !has_mirrors, "clear spheres are no mirrors");
@@ -96,6 +117,8 @@ impl Variant {
             has_motion: shape.has_motion,
             kept_encoding: shape.kept_encoding(),
             levels: shape.levels.max(MIN_STACK_LEVELS),
+            batch,
+            is_single: picture.samples.count == 1,
         }
     }
 
@@ -114,7 +137,12 @@ impl Variant {
         let stack = format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * self.levels);
         let color =
             format!("const COLOR: u32 = {}u;\n", if self.colors_have_opacity { 4 } else { 3 });
-        [stack, color, flags.concat()].concat()
+        let [width, height] = tile_of(self.batch);
+        let batch = format!(
+            "const BATCH: u32 = {}u;\nconst TILE_WIDTH: u32 = {width}u;\nconst TILE_HEIGHT: u32 = {height}u;\n",
+            self.batch
+        );
+        [stack, color, batch, flags.concat()].concat()
     }
 }
 
@@ -185,6 +213,8 @@ impl Kernels {
         let module = device.module(&variant.source(device, part));
         let kernel = |entry, bindings: &[u32]| Kernel::new(device, &module, entry, bindings);
         let of_motion: &[u32] = if variant.has_motion { &[22] } else { &[] };
+        // The sample of a shadow ray only matters for its time
+        let of_time: &[u32] = if variant.has_motion { &[18] } else { &[] };
         let of_spheres: &[u32] = match variant.kept_encoding {
             None => &[2, 3],
             Some(_) => &[24, 25, 26, 27],
@@ -199,22 +229,23 @@ impl Kernels {
             [
                 &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
                 &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
-                &[0, 1, 6, 8, 11, 12, 13, 15, 18, 21],
+                &[0, 1, 6, 8, 11, 12, 13, 15, 21],
             ]
         } else {
             [
                 &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20, 21],
                 &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
-                &[0, 1, 6, 8, 11, 12, 13, 18],
+                &[0, 1, 6, 8, 11, 12, 13],
             ]
         };
         Self {
             empty_queues: kernel("empty_queues", &[8, 13, 14]),
             trace_camera: tracing("trace_camera", &[camera, of_glass].concat()),
             trace_next: tracing("trace_next", &[next, of_glass, of_end].concat()),
-            trace_shadow: tracing("trace_shadow", shadow),
+            trace_shadow: tracing("trace_shadow", &[shadow, of_time].concat()),
+            add_batch: (!variant.is_single).then(|| kernel("add_batch", &[0, 6, 7, 18])),
             clamp_indirect: (variant.has_clamp)
-                .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 18, 21])),
+                .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 21])),
             store_features: (variant.is_denoised)
                 .then(|| kernel("store_features", &[&[0, 7, 12, 28], of_ground].concat())),
         }

@@ -87,6 +87,7 @@
 
 mod arithmetic;
 mod arrays;
+mod batch;
 mod commands;
 mod denoise;
 mod device;

@@ -4,18 +4,10 @@ use spherule_tracer::render::device::{mirrors_see_through, needs_light_parts};
 use spherule_tracer::render::{IntegratorKind, RenderSettings};
 use spherule_tracer::scene::Scene;
 
+use crate::batch::{Batch, DATA_BYTES, FILM_BYTES, MOST_RAYS, PixelNeed};
 use crate::denoise;
 use crate::lighting::RayKinds;
 use crate::picture::{FIRST_GROUP, most_kept};
-use crate::pixels::NearestSample;
-
-/// Memory of the film for each pixel, bytes. `is_denoised`: it has the sums over every second sample.
-pub(crate) const fn film_bytes(is_denoised: bool, has_clamp: bool) -> u64 {
-    16 * (1 + is_denoised as u64 + has_clamp as u64)
-}
-
-/// Memory of the nearest sample of a pixel, bytes.
-pub(crate) const DATA_BYTES: u64 = size_of::<NearestSample>() as u64;
 
 /// Memory of the first surfaces of the samples of a pixel, bytes.
 pub(crate) const fn object_bytes(has_objects: bool, samples: u32) -> u64 {
@@ -51,30 +43,32 @@ fn needs_of(scene: &Scene, settings: &RenderSettings) -> (RayKinds, [u64; 2]) {
     (rays, [objects, layer_bytes(layers, settings.clamp.is_some())])
 }
 
-/// The largest array for the pixels and rays of a picture, bytes.
+/// The need of a picture with these settings.
+fn pixel_need(rays: RayKinds, settings: &RenderSettings) -> PixelNeed {
+    PixelNeed {
+        samples: settings.samples,
+        is_denoised: settings.has_features,
+        has_clamp: rays.has_paths && settings.clamp.is_some(),
+    }
+}
+
+/// The largest array for the pixels and rays of a picture whose samples are traced one by one, bytes.
 pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
     let (rays, [objects, layers]) = needs_of(scene, settings);
-    let shadows = rays.shadow_bytes() * u64::from(rays.sources());
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let denoiser = if settings.has_features { denoise::LARGEST_PER_PIXEL } else { 0 };
-    let arrays = [shadows, rays.ray_bytes(), rays.kept_bytes(), objects, layers, denoiser];
+    let single = Batch::with(pixel_need(rays, settings), 1).largest_bytes(rays);
+    let arrays = [single, rays.kept_bytes(), objects, layers, denoiser];
     arrays.into_iter().max().unwrap_or_default() * pixels
 }
 
-/// Memory of the device for the film and the queues of each pixel, bytes.
-pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
+/// Memory of a device, whose arrays have at most `max_array` bytes, for the film and the queues of each pixel, bytes.
+pub fn bytes_per_pixel(scene: &Scene, settings: &RenderSettings, max_array: u64) -> u64 {
     let (rays, [objects, layers]) = needs_of(scene, settings);
-    let film = film_bytes(settings.has_features, rays.has_paths && settings.clamp.is_some());
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    let batch = Batch::new(rays, pixel_need(rays, settings), pixels, [MOST_RAYS, max_array]);
     let denoiser = if settings.has_features { denoise::BYTES_PER_PIXEL } else { 0 };
-    let shadows = rays.shadow_bytes() * u64::from(rays.sources());
-    4 + film
-        + denoiser
-        + DATA_BYTES
-        + objects
-        + layers
-        + 2 * rays.ray_bytes()
-        + shadows
-        + rays.kept_bytes()
+    4 + batch.bytes(rays) + denoiser + objects + layers + rays.kept_bytes()
 }
 
 /// Memory of the host for each pixel that was traced and is not stored yet, bytes.
@@ -82,5 +76,5 @@ pub fn host_bytes_per_pixel(scene: &Scene, settings: &RenderSettings) -> u64 {
     let (_, [objects, _]) = needs_of(scene, settings);
     let layers = light_groups_of(settings).map_or(0, |groups| FIRST_GROUP + groups);
     let films = 1 + u64::from(settings.has_features);
-    films * film_bytes(false, false) + DATA_BYTES + objects + layer_bytes(layers, false)
+    films * FILM_BYTES + DATA_BYTES + objects + layer_bytes(layers, false)
 }

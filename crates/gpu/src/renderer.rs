@@ -1,4 +1,4 @@
-//! Traces pictures, sample by sample and depth by depth: see `shaders/queues.wgsl`, and `shaders/whitted.wgsl` or
+//! Traces pictures, batch by batch of samples and depth by depth: see `shaders/queues.wgsl`, and `shaders/whitted.wgsl` or
 //! `shaders/path.wgsl` for the transport of light.
 
 use std::collections::BTreeMap;
@@ -7,11 +7,12 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::BindingResource;
 
 use crate::arrays::{Downloads, Uniform, Uniforms};
+use crate::batch::{Batch, DATA_BYTES, FILM_BYTES, MOST_RAYS, PixelNeed};
 use crate::commands::{Commands, Timer};
 use crate::denoise::Denoiser;
-use crate::kernels::{Kernels, Variant};
+use crate::kernels::{self, Kernels, Variant, tile_of};
 use crate::lighting::{Model, SceneUniform};
-use crate::memory::{DATA_BYTES, film_bytes, layer_bytes, object_bytes};
+use crate::memory::{layer_bytes, object_bytes};
 use crate::picture::{FilmSize, Picture, Samples, View};
 use crate::pixels::{Cost, HostPixels};
 use crate::spheres::Spheres;
@@ -20,10 +21,10 @@ use crate::tree::{TreeBuilder, TreeShape};
 use crate::{Device, GpuError};
 
 /// Invocations in a workgroup.
-const GROUP: u64 = 64;
+const GROUP: u64 = kernels::GROUP as u64;
 /// Counters of the light that is lost.
 const LOST_WORDS: usize = 2;
-/// Largest number of stages whose time is kept; pictures of opaque spheres with more samples have several in a stage.
+/// Largest number of stages whose time is kept; pictures of opaque spheres with more batches have several in a stage.
 const MAX_STAGES: u32 = 1025;
 /// Depths between two questions whether the rays of all pixels have ended, if spheres are transmissive. The last of these
 /// depths writes the same queue as the first.
@@ -68,6 +69,8 @@ pub struct Renderer {
     denoiser: Denoiser,
     timer: Option<Timer>,
     downloads: Downloads,
+    /// Rays that are traced together at most, if there are several of a pixel.
+    most_rays: u64,
     has_colors: bool,
     has_opacity: bool,
     color: [f32; 3],
@@ -102,6 +105,7 @@ impl Renderer {
             denoiser: Denoiser::default(),
             timer: Timer::new(device, MAX_STAGES),
             downloads: Downloads::default(),
+            most_rays: MOST_RAYS,
             has_colors: false,
             has_opacity: false,
             color: [0.0; 3],
@@ -109,6 +113,12 @@ impl Renderer {
             stages: 0,
             seconds_before: 0.0,
         }
+    }
+
+    /// The same, which traces at most that many rays together.
+    #[cfg(test)]
+    pub(crate) fn with_most_rays(self, most_rays: u64) -> Self {
+        Self { most_rays, ..self }
     }
 
     /// The tree.
@@ -166,31 +176,32 @@ impl Renderer {
         picture: &Picture<'_>,
         is_stopped: &dyn Fn() -> bool,
     ) -> Result<(), GpuError> {
-        self.reserve(device, picture)?;
+        let batch = self.batch_of(device, picture);
+        self.reserve(device, picture, batch)?;
         let shape = *self.tree.shape();
         assert_eq!(shape.has_motion, picture.exposure.is_some(), "both move, or none");
-        let variant = Variant::of(picture, &shape, self.has_opacity);
+        let variant = Variant::of(picture, &shape, self.has_opacity, batch.samples);
         let part = self.tree.part_constant();
         self.kernels.entry(variant).or_insert_with(|| Kernels::new(device, variant, &part));
-        let plan = self.plan(picture, &shape);
+        let plan = self.plan(picture, &shape, batch);
         self.uniforms.upload(device)?;
-        // Trace sample by sample
+        // Trace batch by batch
         let per_stage = match plan.last {
-            0 => picture.samples.count.div_ceil(MAX_STAGES - 1).max(1),
+            0 => plan.batches.len().div_ceil(MAX_STAGES as usize - 1).max(1),
             _ => 1,
         };
         (self.stages, self.seconds_before) = (1, 0.0);
-        for samples in plan.samples.chunks(per_stage as usize) {
+        for batches in plan.batches.chunks(per_stage) {
             if is_stopped() {
                 device.wait()?;
                 return Err(GpuError::Interrupted);
             }
             let mut commands = Commands::new(device);
-            for sample in samples {
-                self.add_sample(&mut commands, &self.kernels[&variant], &plan, *sample);
+            for first in batches {
+                self.add_batch(&mut commands, &self.kernels[&variant], &plan, *first);
             }
             self.submit_stage(device, commands)?;
-            self.trace_kept(device, &plan, variant, samples, is_stopped)?;
+            self.trace_kept(device, &plan, variant, batches, is_stopped)?;
         }
         self.denoise(device, &plan, variant, picture)?;
         self.traced = Some(Traced {
@@ -220,7 +231,7 @@ impl Renderer {
             commands.submit();
             return Ok(());
         };
-        let array_of = |binding| self.array(binding, plan, [plan.samples[0], plan.depths[0]], 0);
+        let array_of = |binding| self.array(binding, plan, [plan.batches[0], plan.depths[0]], 0);
         commands.add(store, &array_of, plan.film.pixels(), GROUP);
         self.denoiser.add(device, &mut commands, picture, denoising, &self.arrays.film)?;
         self.submit_stage(device, commands)
@@ -248,14 +259,14 @@ impl Renderer {
         device: &Device,
         plan: &Plan,
         variant: Variant,
-        samples: &[Uniform],
+        batches: &[Uniform],
         is_stopped: &dyn Fn() -> bool,
     ) -> Result<(), GpuError> {
-        let ([sample], 1..) = (samples, plan.last) else { return Ok(()) };
+        let ([first], 1..) = (batches, plan.last) else { return Ok(()) };
         loop {
             let lengths: Vec<u32> = bytemuck::pod_collect_to_vec(&self.arrays.queued.read(device)?);
             if lengths[plan.last] == 0 {
-                return Ok(());
+                break;
             }
             if is_stopped() {
                 device.wait()?;
@@ -264,9 +275,24 @@ impl Renderer {
             let mut commands = Commands::new(device);
             let kernels = &self.kernels[&variant];
             self.add_count(&mut commands, kernels, plan);
-            self.add_depths(&mut commands, kernels, plan, *sample, 1);
+            self.add_depths(&mut commands, kernels, plan, *first, 1);
             self.submit_stage(device, commands)?;
         }
+        let mut commands = Commands::new(device);
+        self.add_sums(&mut commands, &self.kernels[&variant], plan, *first);
+        commands.submit();
+        Ok(())
+    }
+
+    /// The batches of a picture.
+    fn batch_of(&self, device: &Device, picture: &Picture<'_>) -> Batch {
+        let need = PixelNeed {
+            samples: picture.samples.count,
+            is_denoised: picture.denoising.is_some(),
+            has_clamp: picture.has_clamp(),
+        };
+        let limits = [self.most_rays, device.adapter().max_array];
+        Batch::new(picture.ray_kinds(), need, picture.film.pixels(), limits)
     }
 
     /// Waits for the picture that was started last, and returns its pixels.
@@ -279,7 +305,7 @@ impl Renderer {
     pub fn read(&self, device: &Device) -> Result<HostPixels, GpuError> {
         let Traced { pixels, samples, is_denoised, has_objects, layers, .. } =
             self.traced.expect("a picture was traced");
-        let film = film_bytes(false, false) * pixels;
+        let film = FILM_BYTES * pixels;
         let parts = [
             (&self.arrays.film, film),
             (self.denoiser.clean(), if is_denoised { film } else { 0 }),
@@ -337,26 +363,29 @@ impl Renderer {
         })
     }
 
-    fn reserve(&mut self, device: &Device, picture: &Picture<'_>) -> Result<(), GpuError> {
+    fn reserve(
+        &mut self,
+        device: &Device,
+        picture: &Picture<'_>,
+        batch: Batch,
+    ) -> Result<(), GpuError> {
         let pixels = picture.film.pixels();
         let rays = picture.ray_kinds();
-        let film = film_bytes(picture.denoising.is_some(), picture.has_clamp());
         if picture.denoising.is_some() {
             self.denoiser.reserve(device, picture)?;
         }
         let counters = vec![0; counter_count(picture) as usize];
         let arrays = &mut self.arrays;
-        arrays.film.reserve(device, "pixels", film * pixels)?;
-        arrays.data.reserve(device, "pixels", DATA_BYTES * pixels)?;
+        arrays.film.reserve(device, "pixels", batch.film_bytes() * pixels)?;
+        arrays.data.reserve(device, "pixels", batch.data_bytes() * pixels)?;
         let objects = object_bytes(picture.has_objects, picture.samples.count);
         arrays.objects.reserve(device, "objects of all samples", objects * pixels)?;
         let layers = layer_bytes(picture.layer_count(), picture.has_clamp());
         arrays.layers.reserve(device, "layers of light", layers * pixels)?;
         for queue in &mut arrays.rays {
-            queue.reserve(device, "rays", rays.ray_bytes() * pixels)?;
+            queue.reserve(device, "rays", batch.ray_bytes(rays) * pixels)?;
         }
-        let shadows = rays.shadow_bytes() * u64::from(rays.sources());
-        arrays.shadows.reserve(device, "shadow rays", shadows * pixels)?;
+        arrays.shadows.reserve(device, "shadow rays", batch.shadow_bytes(rays) * pixels)?;
         arrays.kept.reserve(device, "rays through glass", rays.kept_bytes() * pixels)?;
         if let Model::Paths(lighting) = picture.model {
             arrays.write_tables(device, lighting)?;
@@ -381,9 +410,11 @@ impl Renderer {
     }
 
     /// Fills the uniforms of a picture.
-    fn plan(&mut self, picture: &Picture<'_>, shape: &TreeShape) -> Plan {
+    fn plan(&mut self, picture: &Picture<'_>, shape: &TreeShape, batch: Batch) -> Plan {
         let uniforms = &mut self.uniforms;
         uniforms.clear();
+        let pixels = picture.film.width * picture.film.height;
+        let [first_film, first_data] = batch.before.map(|planes| planes * pixels);
         let view = View {
             levels: shape.levels,
             radius: shape.radius,
@@ -393,6 +424,8 @@ impl Renderer {
             wide_count: u32::try_from(shape.wide_count).expect("fewer than spheres"),
             color_kind: self.has_colors.into(),
             color: self.color,
+            first_film,
+            first_data,
             ..View::new(picture)
         };
         let view = uniforms.push(&view);
@@ -401,10 +434,9 @@ impl Renderer {
             Model::Paths(lighting) => Some(uniforms.push(&SceneUniform::from(lighting))),
         };
         let counters = counter_count(picture);
-        let samples = 0..picture.samples.count;
-        let samples = samples
-            .map(|sample| uniforms.push(&Current { sample, ..Current::default() }))
-            .collect();
+        let firsts = (0..picture.samples.count).step_by(batch.samples as usize);
+        let batches =
+            firsts.map(|sample| uniforms.push(&Current { sample, ..Current::default() })).collect();
         let depth_count = depth_count(picture);
         let last = match picture.kept_rays() {
             Some(_) => (depth_count - 1) * picture.ray_kinds().queues(),
@@ -420,7 +452,8 @@ impl Renderer {
             film: picture.film,
             counters,
             last: last as usize,
-            samples,
+            batch: batch.samples,
+            batches,
             depths: all(&mut depths.clone().map(|depth| Stage { depth, ..Stage::default() })),
             sources: depths
                 .map(|depth| {
@@ -432,50 +465,68 @@ impl Renderer {
         }
     }
 
-    /// Adds the dispatches of one sample of all pixels.
-    fn add_sample(
+    /// Adds the dispatches of the samples of a batch.
+    fn add_batch(
         &self,
         commands: &mut Commands<'_>,
         kernels: &Kernels,
         plan: &Plan,
-        sample: Uniform,
+        first: Uniform,
     ) {
         self.add_count(commands, kernels, plan);
-        self.add_depths(commands, kernels, plan, sample, 0);
+        self.add_depths(commands, kernels, plan, first, 0);
+        // Those through glass have not ended yet
+        if plan.last == 0 {
+            self.add_sums(commands, kernels, plan, first);
+        }
     }
 
-    /// Adds the dispatches of one sample from a depth on, which counts from 0.
+    /// Adds the dispatch that adds the samples of a batch to their pixels, if they have several.
+    fn add_sums(
+        &self,
+        commands: &mut Commands<'_>,
+        kernels: &Kernels,
+        plan: &Plan,
+        first: Uniform,
+    ) {
+        let Some(add) = &kernels.add_batch else { return };
+        let array_of = |binding| self.array(binding, plan, [first, plan.depths[0]], 0);
+        commands.add(add, &array_of, plan.film.pixels(), GROUP);
+    }
+
+    /// Adds the dispatches of a batch from a depth on, which counts from 0.
     fn add_depths(
         &self,
         commands: &mut Commands<'_>,
         kernels: &Kernels,
         plan: &Plan,
-        sample: Uniform,
+        batch: Uniform,
         first: usize,
     ) {
-        let pixels = plan.film.pixels();
+        let rays = plan.film.pixels() * u64::from(plan.batch);
         let depths = plan.depths.iter().zip(&plan.sources).enumerate();
         for (number, (depth, sources)) in depths.skip(first) {
-            let array_of = |binding| self.array(binding, plan, [sample, *depth], number);
+            let array_of = |binding| self.array(binding, plan, [batch, *depth], number);
             if number == 0 {
-                let squares = [plan.film.width.div_ceil(8), plan.film.height.div_ceil(8)];
-                commands.add_groups(&kernels.trace_camera, &array_of, squares);
+                let [width, height] = tile_of(plan.batch);
+                let tiles = [plan.film.width.div_ceil(width), plan.film.height.div_ceil(height)];
+                commands.add_groups(&kernels.trace_camera, &array_of, tiles);
             } else {
-                commands.add(&kernels.trace_next, &array_of, pixels, GROUP);
+                commands.add(&kernels.trace_next, &array_of, rays, GROUP);
             }
             for source in sources {
-                let array_of = |binding| self.array(binding, plan, [sample, *source], number);
-                commands.add(&kernels.trace_shadow, &array_of, pixels, GROUP);
+                let array_of = |binding| self.array(binding, plan, [batch, *source], number);
+                commands.add(&kernels.trace_shadow, &array_of, rays, GROUP);
             }
             if let (Some(clamp), 1..) = (&kernels.clamp_indirect, number) {
-                commands.add(clamp, &array_of, pixels, GROUP);
+                commands.add(clamp, &array_of, rays, GROUP);
             }
         }
     }
 
     /// Adds the dispatch that empties the queues, and counts the rays that they had.
     fn add_count(&self, commands: &mut Commands<'_>, kernels: &Kernels, plan: &Plan) {
-        let array_of = |binding| self.array(binding, plan, [plan.samples[0], plan.depths[0]], 0);
+        let array_of = |binding| self.array(binding, plan, [plan.batches[0], plan.depths[0]], 0);
         commands.add(&kernels.empty_queues, &array_of, plan.counters.into(), GROUP);
     }
 
@@ -484,7 +535,7 @@ impl Renderer {
         &self,
         binding: u32,
         plan: &Plan,
-        [sample, stage]: [Uniform; 2],
+        [batch, stage]: [Uniform; 2],
         depth: usize,
     ) -> BindingResource<'_> {
         let arrays = &self.arrays;
@@ -492,7 +543,7 @@ impl Renderer {
             0 => return self.uniforms.binding(plan.view),
             15 => return self.uniforms.binding(plan.scene.expect("only kernels for paths use it")),
             13 => return self.uniforms.binding(stage),
-            18 => return self.uniforms.binding(sample),
+            18 => return self.uniforms.binding(batch),
             4 => &arrays.points,
             5 => &arrays.sets,
             6 => &arrays.film,
@@ -573,7 +624,10 @@ struct Plan {
     counters: u32,
     /// The queue of the rays that go on behind the last depth, or 0.
     last: usize,
-    samples: Vec<Uniform>,
+    /// Samples of a batch.
+    batch: u32,
+    /// The first sample of each batch.
+    batches: Vec<Uniform>,
     depths: Vec<Uniform>,
     /// The sources of shadow rays of each depth.
     sources: Vec<Vec<Uniform>>,

@@ -329,7 +329,8 @@ fn a_lost_device_fails_pictures() {
     let Some(device) = device(Checks::Off) else { return };
     let device = Arc::new(device);
     let mut renderer = SceneRenderer::new(Arc::clone(&device));
-    let case = Case { samples: 4, ..Case::small() };
+    // Three batches
+    let case = Case { samples: 40, ..Case::small() };
     let loss = Loss(Arc::clone(&device), AtomicU32::new(0));
     let expected = format!("{} was lost: ", device.adapter().name);
     // It stays lost: also the next picture fails, and so does the first one of another renderer

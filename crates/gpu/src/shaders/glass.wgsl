@@ -44,7 +44,7 @@ fn stored_state(i: u32) -> State {
 }
 
 fn store_state(place: u32, pixel: u32, state: State) {
-  next_rays[RAY * place] = vec4<f32>(state.start, bitcast<f32>(pixel));
+  next_rays[RAY * place] = vec4<f32>(state.start, word_of(pixel));
   let words = vec4<u32>(state.seed, state.depth | (state.bounces << 16u), state.kept | (state.first << 16u));
   next_rays[RAY * place + RAY - 1u] = bitcast<vec4<f32>>(words);
 }
@@ -88,7 +88,7 @@ fn split_weights(weights: vec2<f32>, arriving: f32, state: State) -> vec2<f32> {
   let splits = mul(arriving, lesser) >= view.split_weight && state.kept < view.kept;
   if (lesser <= 0.0 || splits) { return weights; }
   let both = weights.x + weights.y;
-  let is_lesser = number_1d(state.seed, BRANCH, current.sample) < quotient(lesser, both);
+  let is_lesser = number_1d(state.seed, BRANCH, sample_number()) < quotient(lesser, both);
   let takes_reflected = (weights.x < weights.y) == is_lesser;
   return select(vec2<f32>(0.0, both), vec2<f32>(both, 0.0), takes_reflected);
 }

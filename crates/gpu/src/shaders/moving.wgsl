@@ -12,7 +12,7 @@ fn sphere_at(slot: u32, time: f32) -> vec4<f32> {
 
 // The time at which the rays of a sample see the scene
 fn time_of(pixel: u32) -> f32 {
-  return number_1d(child_of(seed_at(pixel, 0u, BOUNCED), CAMERA), TIME, current.sample) - 0.5;
+  return number_1d(child_of(seed_at(pixel, 0u, BOUNCED), CAMERA), TIME, sample_number()) - 0.5;
 }
 
 // Between the lines of the camera at both ends of the exposure

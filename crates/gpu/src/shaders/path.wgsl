@@ -51,7 +51,7 @@ fn no_shadow() -> Shadow {
 fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
   let place = append(queue_of(stage.depth) + 1u + source, shadow.is_needed) + first_shadow(source);
   if (shadow.is_needed) {
-    shadows[SHADOW * place] = vec4<f32>(shadow.start, bitcast<f32>(pixel));
+    shadows[SHADOW * place] = vec4<f32>(shadow.start, word_of(pixel));
     shadows[SHADOW * place + 1u] = vec4<f32>(shadow.direction, shadow.length);
     shadows[SHADOW * place + 2u] = vec4<f32>(shadow.radiance, shadow.coverage);
     if (HAS_LAYERS) { shadows[SHADOW * place + 3u] = shadow.parts; }
@@ -97,7 +97,7 @@ fn diffuse_along(vertex: Vertex, direction: vec3<f32>) -> vec3<f32> {
 fn sample_source(number: u32, vertex: Vertex, seed: Wide) -> LightSample {
   let light = view.lights[number];
   var u = vec2<f32>(0.0);
-  if (has_extent(light)) { u = numbers_2d(seed, LIGHTS + number, current.sample); }
+  if (has_extent(light)) { u = numbers_2d(seed, LIGHTS + number, sample_number()); }
   return sample_light(light, vertex.start, u);
 }
 
@@ -167,7 +167,7 @@ fn catch_shadows(
   // A ray to each source
   var shadow = no_shadow();
   if (is_caught && scene.catcher.side > 0u) {
-    let sample = sample_table(scene.catcher, numbers_2d(seed, ENVIRONMENT, current.sample));
+    let sample = sample_table(scene.catcher, numbers_2d(seed, ENVIRONMENT, sample_number()));
     let light = sample.radiance * (INVERSE_PI / sample.pdf);
     let is_above = dot(sample.direction, white.normal) > 0.0;
     let parts = vec4<f32>(light * part, dot(light, LUMINANCE));
@@ -206,7 +206,7 @@ fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide, pixel: u
 }
 
 fn next_ray(vertex: Vertex, weight: vec3<f32>, seed: Wide, state: State) -> Next {
-  let sample = sample_bsdf(vertex.finish, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, current.sample));
+  let sample = sample_bsdf(vertex.finish, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, sample_number()));
   let is_ray = sample.pdf > 0.0;
   return Next(is_ray, sample.direction, weight * sample.weight, sample.pdf, bounced(state, vertex.start));
 }
@@ -215,7 +215,7 @@ fn next_ray(vertex: Vertex, weight: vec3<f32>, seed: Wide, state: State) -> Next
 fn roulette(next: Next, bounces: u32, seed: Wide) -> Next {
   if (bounces < ROULETTE_START) { return next; }
   let chance = min(largest_of(next.throughput), MAX_CONTINUATION);
-  let goes_on = number_1d(seed, CONTINUATION, current.sample) < chance;
+  let goes_on = number_1d(seed, CONTINUATION, sample_number()) < chance;
   return Next(next.is_ray && goes_on, next.direction, next.throughput / chance, next.pdf, next.state);
 }
 
@@ -256,7 +256,7 @@ fn add_shadow_parts(pixel: u32, light: vec3<f32>, role: f32, part: f32, parts: v
 }
 
 // The place in the film of the indirect light that is being traced for a pixel
-fn indirect_place(pixel: u32) -> u32 { return (1u + view.has_odd) * view.width * view.height + pixel; }
+fn indirect_place(pixel: u32) -> u32 { return place_in(view.first_film, pixel) + BATCH * view.width * view.height; }
 
 // Adds the light along a ray. A clamp limits what it brings to its first surface, but `direct`; that stays apart until
 // its shadow rays are traced.
@@ -321,12 +321,12 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   if (is_sphere) {
     surface = surface_at(ray, hit);
     vertex = Vertex(surface.normal, surface.start, base_color(hit.index), -ray.direction, finish_of(hit.index));
-    if (is_first) { keep_nearest(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, path.pixel); }
+    if (is_first) { keep_surface(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, path.pixel); }
   } else if (is_ground) {
     vertex = Vertex(scene.ground_up, above_ground(ground), ground_color(ground.point), -ray.direction, OF_GROUND);
     weight *= ground.opacity;
     if (is_first && !is_caught) {
-      keep_nearest(depth_of(ray, ground.t), GROUND, scene.ground_up, ground.point, path.pixel);
+      keep_surface(depth_of(ray, ground.t), GROUND, scene.ground_up, ground.point, path.pixel);
     }
   }
   vertex.base = clamp(vertex.base, vec3<f32>(0.0), vec3<f32>(1.0));
@@ -348,7 +348,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   // Light of the environment
   var shadow = no_shadow();
   if (is_shaded && scene.environment.side > 0u) {
-    let sample = sample_table(scene.environment, numbers_2d(seed, ENVIRONMENT, current.sample));
+    let sample = sample_table(scene.environment, numbers_2d(seed, ENVIRONMENT, sample_number()));
     let light = LightSample(sample.direction, FAR, sample.radiance, sample.pdf);
     shadow = shadow_of(vertex, light, reflected(vertex, weight, light, true), path.state);
   }
@@ -399,7 +399,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   count_refracted(next);
   let place = append(queue_of(stage.depth), next.is_ray);
   if (next.is_ray) {
-    next_rays[RAY * place] = vec4<f32>(vertex.start, bitcast<f32>(path.pixel));
+    next_rays[RAY * place] = vec4<f32>(vertex.start, word_of(path.pixel));
     next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
     if (HAS_MIRRORS) {
@@ -412,23 +412,27 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   }
 }
 
-// Camera rays, in squares of 8x8 pixels.
-@compute @workgroup_size(8, 8)
-fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
-  let is_ray = id.x < view.width && id.y < view.height;
-  let pixel = id.y * view.width + id.x;
+// Camera rays: a tile of pixels in each workgroup.
+@compute @workgroup_size(GROUP)
+fn trace_camera(
+  @builtin(workgroup_id) group: vec3<u32>,
+  @builtin(local_invocation_index) local: u32,
+) {
+  let at = camera_pixel(group, local);
+  let is_ray = at.x < view.width && at.y < view.height && sample_number() < view.samples;
+  let pixel = at.y * view.width + at.x;
   var path = camera_path(pixel, vec2<f32>(0.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
   if (is_ray) {
-    if (current.sample == 0u) { clear_pixel(pixel); }
-    path.on_film = film_position(id.x, id.y, current.sample);
+    start_sample(pixel);
+    path.on_film = film_position(at.x, at.y, sample_number());
     ray = camera_ray(path.on_film, time_of(pixel));
     path.on_film = seen_on_film(path.on_film, ray.time);
     if (view.lens_radius > 0.0) {
       let seed = child_of(seed_at(pixel, 0u, BOUNCED), CAMERA);
-      ray = through_lens(ray, numbers_2d(seed, LENS, current.sample));
+      ray = through_lens(ray, numbers_2d(seed, LENS, sample_number()));
     }
     ground = hit_ground(ray);
     hit = nearest(ray, ground.t, number_of_end(pixel, BOUNCED));
@@ -453,7 +457,7 @@ fn trace_next(
     let origin = rays[RAY * i];
     let direction = rays[RAY * i + 1u];
     let throughput = rays[RAY * i + 2u].xyz;
-    let pixel = bitcast<u32>(origin.w);
+    let pixel = pixel_in(origin.w);
     path = Path(throughput, direction.w, pixel, vec2<f32>(0.0), vec3<f32>(1.0), stored_state(i));
     ray = Ray(origin.xyz, direction.xyz, time_of(path.pixel));
     if (HAS_MIRRORS) { path.diffuse = rays[RAY * i + 3u].xyz; }
@@ -476,7 +480,7 @@ fn trace_shadow(
   let start = shadows[place];
   let into = shadows[place + 1u];
   let light = shadows[place + 2u];
-  let pixel = bitcast<u32>(start.w);
+  let pixel = pixel_in(start.w);
   let ray = Ray(start.xyz, into.xyz, time_of(pixel));
   var passing = 0.0;
   let adds = light.w <= ADDS;
@@ -514,7 +518,7 @@ fn clamp_indirect(
   let i = linear_index(group, groups, local, GROUP);
   if (i >= atomicLoad(&queued[queue_of(stage.depth - 1u)])) { return; }
   if (bounces_of(stored_state(i)) == 0u) { return; }
-  let pixel = bitcast<u32>(rays[RAY * i].w);
+  let pixel = pixel_in(rays[RAY * i].w);
   let light = film[indirect_place(pixel)];
   let largest = largest_of(light.xyz);
   // What is not finite stays, so that faults are visible

@@ -10,7 +10,7 @@ fn passed(facets: Finish, out: f32, into: f32) -> f32 {
 
 // The rays at a microfacet
 fn leave(ray: Ray, surface: Surface, seed: Wide) -> Leaving {
-  let u = numbers_2d(seed, BSDF, current.sample);
+  let u = numbers_2d(seed, BSDF, sample_number());
   let n = surface.normal;
   let ratio = select(view.ior, inverse(view.ior), surface.is_entering);
   let facets = Finish(0u, METAL, scene.glass_alpha, scene.glass_table + select(GLASS_TABLE, 0u, surface.is_entering));

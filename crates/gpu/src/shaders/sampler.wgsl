@@ -107,5 +107,5 @@ fn seed_at(pixel: u32, bounces: u32, branch: u32) -> Wide {
 // The number that chooses at which sphere a ray of this depth ends, if they are not opaque
 fn number_of_end(pixel: u32, branch: u32) -> f32 {
   if (!HAS_OPACITY) { return 0.0; }
-  return number_1d(seed_at(pixel, stage.depth - 1u, branch), OPACITY, current.sample);
+  return number_1d(seed_at(pixel, stage.depth - 1u, branch), OPACITY, sample_number());
 }

@@ -54,8 +54,8 @@ struct View {
   // the number of queues at each depth
   extinction: vec3<f32>, transmission: f32,
   split_weight: f32, color_length: f32, kept: u32, queues: u32,
-  // Number of spheres, and of their blocks that are not coded, if spheres stay coded
-  sphere_count: u32, wide_count: u32, view_zero: u32, view_zero_too: u32,
+  // Number of spheres, and of their blocks that are not coded, if spheres stay coded; where the samples of a batch begin
+  sphere_count: u32, wide_count: u32, first_film: u32, first_data: u32,
   // The camera when the shutter opens and when it closes
   open: CameraAt,
   close: CameraAt,

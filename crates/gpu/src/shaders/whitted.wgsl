@@ -50,7 +50,7 @@ fn mirrored(path: Path, ray: Ray, surface: Surface) -> Next {
 
 // Without glass, the throughput is grey.
 fn store_ray(place: u32, start: vec3<f32>, next: Next, pixel: u32) {
-  next_rays[RAY * place] = vec4<f32>(start, bitcast<f32>(pixel));
+  next_rays[RAY * place] = vec4<f32>(start, word_of(pixel));
   next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.throughput.x);
   if (HAS_GLASS) {
     next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
@@ -62,7 +62,7 @@ fn store_ray(place: u32, start: vec3<f32>, next: Next, pixel: u32) {
 fn stored_path(i: u32) -> Path {
   var throughput = vec3<f32>(rays[RAY * i + 1u].w);
   if (HAS_GLASS) { throughput = rays[RAY * i + 2u].xyz; }
-  let pixel = bitcast<u32>(rays[RAY * i].w);
+  let pixel = pixel_in(rays[RAY * i].w);
   return Path(throughput, FAR, pixel, vec2<f32>(0.0), vec3<f32>(1.0), stored_state(i));
 }
 
@@ -84,7 +84,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
     surface = surface_at(ray, hit);
     if (stage.depth == 1u) {
       sum.w = 1.0;
-      keep_nearest(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, pixel);
+      keep_surface(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, pixel);
     }
     throughput = absorbed(path, ray, hit, surface);
     // Ambient light
@@ -120,7 +120,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
     }
     let place = append(queue + 1u + number, is_lit) + first_shadow(number);
     if (is_lit) {
-      shadows[SHADOW * place] = vec4<f32>(surface.start, bitcast<f32>(pixel));
+      shadows[SHADOW * place] = vec4<f32>(surface.start, word_of(pixel));
       shadows[SHADOW * place + 1u] = vec4<f32>(radiance, 0.0);
     }
   }
@@ -130,17 +130,21 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
   }
 }
 
-// Camera rays, in squares of 8x8 pixels.
-@compute @workgroup_size(8, 8)
-fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
-  let is_ray = id.x < view.width && id.y < view.height;
-  let pixel = id.y * view.width + id.x;
+// Camera rays: a tile of pixels in each workgroup.
+@compute @workgroup_size(GROUP)
+fn trace_camera(
+  @builtin(workgroup_id) group: vec3<u32>,
+  @builtin(local_invocation_index) local: u32,
+) {
+  let at = camera_pixel(group, local);
+  let is_ray = at.x < view.width && at.y < view.height && sample_number() < view.samples;
+  let pixel = at.y * view.width + at.x;
   var ray: Ray;
   var hit = Hit(0.0, MISS, MISS);
   var path = camera_path(pixel, vec2<f32>(0.0));
   if (is_ray) {
-    if (current.sample == 0u) { clear_pixel(pixel); }
-    path.on_film = film_position(id.x, id.y, current.sample);
+    start_sample(pixel);
+    path.on_film = film_position(at.x, at.y, sample_number());
     ray = camera_ray(path.on_film, time_of(pixel));
     path.on_film = seen_on_film(path.on_film, ray.time);
     hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
@@ -180,7 +184,7 @@ fn trace_shadow(
   let place = i + first_shadow(stage.source);
   let start = shadows[SHADOW * place];
   let into = toward(view.lights[stage.source], start.xyz);
-  let pixel = bitcast<u32>(start.w);
+  let pixel = pixel_in(start.w);
   let passing = transmittance(Ray(start.xyz, into.xyz, time_of(pixel)), into.w, true);
   if (passing > 0.0) {
     add_to_film(pixel, vec4<f32>(passing * shadows[SHADOW * place + 1u].xyz, 0.0));
