@@ -9,8 +9,8 @@ use spherule_files::memory::MemoryUse;
 use spherule_formats::native::{self, NativeFile};
 use spherule_formats::sequence::Sequence;
 use spherule_gpu::{
-    AdapterSummary, Arithmetic, Checks, Cost, Device, Encoding, GpuError, HostImage, MAX_FINISHES,
-    Missing, SceneError, SceneRenderer, TreeNeed, bytes_per_pixel, host_bytes_per_pixel,
+    AdapterSummary, Arithmetic, Checks, Cost, Device, Encoding, GpuError, MAX_FINISHES, Missing,
+    PendingImage, SceneError, SceneRenderer, TreeNeed, bytes_per_pixel, host_bytes_per_pixel,
     largest_array, missing, ray_counts,
 };
 
@@ -344,20 +344,16 @@ impl FrameRenderer for GpuRenderer {
         frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
-        let start = Instant::now();
-        let (image, cost) = self.draw(setup, frame, setup.picture.denoise, stop)?;
+        let image = self.draw(setup, frame, setup.picture.denoise, stop)?;
         let memory = MemoryUse::now();
         let mut report = frame.report.clone();
-        report.seconds.trace = (start.elapsed().as_secs_f64() - cost.denoise_seconds).max(0.0);
-        report.rays = ray_counts(&cost).into();
-        report.seconds.denoise = cost.denoise_seconds;
         report.build = BuildSummary {
             structure: "lbvh".to_owned(),
             order: "hilbert".to_owned(),
             simd: "gpu".to_owned(),
             ..BuildSummary::default()
         };
-        report.device = Some(self.summary(&cost));
+        report.device = Some(self.summary());
         Ok(TracedFrame {
             camera: setup.camera_at(frame.task.frame)?,
             task: frame.task.clone(),
@@ -377,9 +373,8 @@ impl FrameRenderer for GpuRenderer {
         frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), TraceError> {
-        let (image, cost) = self.draw(setup, frame, None, stop)?;
         let mut film = Film::default();
-        image.store(setup, &mut film)?;
+        let cost = self.draw(setup, frame, None, stop)?.store(setup, &mut film)?;
         Ok((film, ray_counts(&cost)))
     }
 
@@ -433,35 +428,33 @@ impl GpuRenderer {
         frame: &BuiltFrame,
         denoise: Option<DenoiseSettings>,
         stop: &dyn Stop,
-    ) -> Result<(DeviceImage, Cost), TraceError> {
+    ) -> Result<DeviceImage, TraceError> {
         let mut renderer = lock(&self.renderer);
         let Some(renderer) = &mut *renderer else {
             return Err(TraceError::Device("no frame was prepared".to_owned()));
         };
         let scene = setup.scene_at(frame.task.frame, frame.focus)?;
         let settings = settings_of(setup);
-        let (pixels, cost) = with_source(setup, &frame.particles, |source| {
-            (renderer.render(&scene, source, &settings, denoise, stop)).map_err(scene_failed)
+        let image = with_source(setup, &frame.particles, |source| {
+            (renderer.begin(&scene, source, &settings, denoise, stop)).map_err(scene_failed)
         })?;
-        let image = DeviceImage {
-            pixels,
+        Ok(DeviceImage {
+            image,
+            started: Instant::now(),
             particles: Arc::clone(&frame.particles),
             frame: frame.task.frame,
             focus: frame.focus,
-            rays: ray_counts(&cost),
-        };
-        Ok((image, cost))
+        })
     }
 
-    fn summary(&self, cost: &Cost) -> DeviceSummary {
+    /// The device, without what the image costs.
+    fn summary(&self) -> DeviceSummary {
         let renderer = lock(&self.renderer);
         let adapter = renderer.as_ref().map(|renderer| renderer.device().adapter());
         DeviceSummary {
             name: adapter.map(|adapter| adapter.name.clone()).unwrap_or_default(),
             driver: adapter.map(|adapter| adapter.driver.clone()).unwrap_or_default(),
-            build: cost.build_seconds,
-            trace: cost.trace_seconds,
-            bytes: cost.bytes,
+            ..DeviceSummary::default()
         }
     }
 }
@@ -487,31 +480,47 @@ fn with_source<T>(
     }
 }
 
-/// An image whose pixels are not in a film yet.
+/// An image that the device renders, or whose pixels are not in a film yet.
 #[derive(Debug)]
 struct DeviceImage {
-    pixels: HostImage,
+    image: PendingImage,
+    /// When the device began with it.
+    started: Instant,
     particles: Arc<BuiltParticles>,
     frame: i64,
     focus: Option<Vec3>,
-    rays: RayCounts,
 }
 
 impl DeviceImage {
-    fn store(&self, setup: &Setup, film: &mut Film) -> Result<(), TraceError> {
+    /// Waits for the image and stores it. Returns what it has cost.
+    fn store(self, setup: &Setup, film: &mut Film) -> Result<Cost, TraceError> {
+        let (image, cost) = self.image.wait().map_err(failed)?;
         let scene = setup.scene_at(self.frame, self.focus)?;
         with_source(setup, &self.particles, |source| {
-            let stored = self.pixels.store(film, &scene, source, &settings_of(setup));
+            let stored = image.store(film, &scene, source, &settings_of(setup));
             stored.map_err(TraceError::Render)
-        })
+        })?;
+        Ok(cost)
     }
 }
 
 impl UnfinishedImage for DeviceImage {
     fn finish(self: Box<Self>, setup: &Setup, frame: &mut TracedFrame) -> Result<(), TraceError> {
-        self.store(setup, &mut frame.film)?;
-        let samples = setup.picture.render.samples;
-        frame.report.clamped_light = self.rays.lost.part(&frame.film.color, samples);
+        let started = self.started;
+        let cost = self.store(setup, &mut frame.film)?;
+        let rays = ray_counts(&cost);
+        let report = &mut frame.report;
+        // A device without a clock tells no time
+        let on_device = cost.build_seconds + cost.trace_seconds;
+        report.seconds.trace =
+            if on_device > 0.0 { on_device } else { started.elapsed().as_secs_f64() };
+        report.seconds.denoise = cost.denoise_seconds;
+        report.clamped_light = rays.lost.part(&frame.film.color, setup.picture.render.samples);
+        report.rays = rays.into();
+        if let Some(device) = &mut report.device {
+            (device.build, device.trace) = (cost.build_seconds, cost.trace_seconds);
+            device.bytes = cost.bytes;
+        }
         Ok(())
     }
 }

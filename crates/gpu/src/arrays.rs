@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use rayon::prelude::*;
 use wgpu::{
     BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, BufferView,
-    CommandEncoder, MapMode,
+    CommandEncoder, MapMode, SubmissionIndex,
 };
 
 use crate::{Device, GpuError};
@@ -33,6 +33,8 @@ struct Upload {
     parts: Vec<Buffer>,
     /// Bytes of each part but the last.
     share: u64,
+    /// The copies of the last time.
+    submission: Option<SubmissionIndex>,
 }
 
 impl Upload {
@@ -46,7 +48,10 @@ impl Upload {
                 // The result of the map is that of the wait
                 part.map_async(MapMode::Write, .., |_result| ());
             }
-            device.wait()?;
+            // Not for what was submitted behind them: pictures
+            if let Some(submission) = &self.submission {
+                device.wait_for(submission)?;
+            }
         } else {
             self.parts.clear();
             self.parts.extend((0..len.div_ceil(share)).map(|_| {
@@ -129,7 +134,7 @@ impl Array {
             let len = part.size().min(bytes.len() as u64 - at);
             encoder.copy_buffer_to_buffer(part, 0, self.buffer(), at, len);
         }
-        device.queue.submit([encoder.finish()]);
+        self.upload.submission = Some(device.queue.submit([encoder.finish()]));
         device.check()
     }
 
@@ -147,6 +152,11 @@ impl Array {
         self.buffer.as_ref().expect("arrays are reserved before kernels use them")
     }
 
+    /// Bytes in use.
+    pub(crate) const fn len(&self) -> u64 {
+        self.len
+    }
+
     /// Memory of the array, bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.buffer.as_ref().map_or(0, Buffer::size)
@@ -160,8 +170,8 @@ impl Array {
         let download = Downloads::default().reserve(device, self.len)?;
         let mut encoder = device.raw.create_command_encoder(&Default::default());
         download.copy(&mut encoder, self.buffer(), [0, self.len]);
-        device.queue.submit([encoder.finish()]);
-        Ok(download.read(device)?.bytes().to_vec())
+        let submission = device.queue.submit([encoder.finish()]);
+        Ok(download.after(submission).wait(device)?.bytes().to_vec())
     }
 }
 
@@ -210,16 +220,36 @@ impl Download {
         encoder.copy_buffer_to_buffer(source, 0, &self.buffer, at, len);
     }
 
+    /// The content, once the device has made the copies of a submission.
+    pub(crate) fn after(self, submission: SubmissionIndex) -> PendingDownload {
+        // The result of the map is that of the wait
+        self.buffer.map_async(MapMode::Read, .., |_result| ());
+        PendingDownload { download: self, submission }
+    }
+}
+
+/// Memory that the device has not filled yet.
+#[derive(Debug)]
+pub(crate) struct PendingDownload {
+    download: Download,
+    submission: SubmissionIndex,
+}
+
+impl PendingDownload {
+    /// What the device has done once the content is there.
+    pub(crate) fn submission(&self) -> &SubmissionIndex {
+        &self.submission
+    }
+
     /// Waits for the device, and returns the content.
     ///
     /// # Errors
     /// If the device fails.
-    pub(crate) fn read(self, device: &Device) -> Result<Downloaded, GpuError> {
-        // The result of the map is that of the wait
-        self.buffer.map_async(MapMode::Read, .., |_result| ());
-        device.wait()?;
-        let view = self.buffer.get_mapped_range(..).map_err(|error| device.lost(&error))?;
-        Ok(Downloaded { view: Some(view), download: self })
+    pub(crate) fn wait(self, device: &Device) -> Result<Downloaded, GpuError> {
+        let Self { download, submission } = self;
+        device.wait_for(&submission)?;
+        let view = download.buffer.get_mapped_range(..).map_err(|error| device.lost(&error))?;
+        Ok(Downloaded { view: Some(view), download })
     }
 }
 

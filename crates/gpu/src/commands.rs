@@ -3,7 +3,7 @@
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, CommandEncoder,
     ComputePassDescriptor, ComputePassTimestampWrites, ComputePipeline, ComputePipelineDescriptor,
-    PipelineCompilationOptions, ShaderModule,
+    PipelineCompilationOptions, ShaderModule, SubmissionIndex,
 };
 
 use crate::arrays::{Array, Download, Downloads};
@@ -122,12 +122,19 @@ impl<'a> Commands<'a> {
         download.copy(&mut self.encoder, array.buffer(), range);
     }
 
+    /// Copies the times of the first stages of `timer` to `at` in `download`.
+    pub(crate) fn copy_times(&mut self, timer: &Timer, stages: u32, download: &Download, at: u64) {
+        let Timer { queries, resolved } = timer;
+        self.encoder.resolve_query_set(queries, 0..2 * stages, resolved, 0);
+        download.copy(&mut self.encoder, resolved, [at, times_bytes(stages)]);
+    }
+
     /// Starts all on the device.
-    pub(crate) fn submit(mut self) {
+    pub(crate) fn submit(mut self) -> SubmissionIndex {
         if !self.dispatches.is_empty() {
             self.end_stage(None);
         }
-        self.device.queue.submit([self.encoder.finish()]);
+        self.device.queue.submit([self.encoder.finish()])
     }
 }
 
@@ -156,19 +163,27 @@ impl Timer {
         })
     }
 
-    /// Seconds of each of the first `stages`, which must have run.
+    /// Seconds of each of the first `stages`, once they have run.
     ///
     /// # Errors
     /// If the device fails.
     pub(crate) fn seconds(&self, device: &Device, stages: u32) -> Result<Vec<f64>, GpuError> {
-        let mut encoder = device.raw.create_command_encoder(&Default::default());
-        encoder.resolve_query_set(&self.queries, 0..2 * stages, &self.resolved, 0);
-        let len = 16 * u64::from(stages);
-        let download = Downloads::default().reserve(device, len)?;
-        download.copy(&mut encoder, &self.resolved, [0, len]);
-        device.queue.submit([encoder.finish()]);
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(download.read(device)?.bytes());
-        let period = f64::from(device.queue.get_timestamp_period()) * 1e-9;
-        Ok(ticks.chunks_exact(2).map(|t| t[1].wrapping_sub(t[0]) as f64 * period).collect())
+        let download = Downloads::default().reserve(device, times_bytes(stages))?;
+        let mut commands = Commands::new(device);
+        commands.copy_times(self, stages, &download, 0);
+        let submission = commands.submit();
+        Ok(seconds_of(device, download.after(submission).wait(device)?.bytes()))
     }
+}
+
+/// Memory of the times of stages, bytes.
+pub(crate) const fn times_bytes(stages: u32) -> u64 {
+    16 * stages as u64
+}
+
+/// Seconds of stages, from the times of their ends.
+pub(crate) fn seconds_of(device: &Device, times: &[u8]) -> Vec<f64> {
+    let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(times);
+    let period = f64::from(device.queue.get_timestamp_period()) * 1e-9;
+    ticks.chunks_exact(2).map(|t| t[1].wrapping_sub(t[0]) as f64 * period).collect()
 }

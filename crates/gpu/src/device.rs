@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{
     Adapter, Backends, DeviceDescriptor, DeviceType, Error, Features, Instance, InstanceDescriptor,
-    PollType, ShaderModule, ShaderModuleDescriptor, ShaderSource,
+    PollType, ShaderModule, ShaderModuleDescriptor, ShaderSource, SubmissionIndex,
 };
 
 use crate::GpuError;
@@ -178,6 +178,22 @@ impl Device {
     pub(crate) fn wait(&self) -> Result<(), GpuError> {
         let waited = self.raw.poll(PollType::wait_indefinitely());
         self.check()?;
+        waited.map(drop).map_err(|error| self.lost(&error))
+    }
+
+    /// Waits until the device has done what was submitted up to here; more may follow meanwhile.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub(crate) fn wait_for(&self, submission: &SubmissionIndex) -> Result<(), GpuError> {
+        let submission_index = Some(submission.clone());
+        let waited = self.raw.poll(PollType::Wait { submission_index, timeout: None });
+        // Other errors are those of who submits
+        let kept = self.faults.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(GpuError::Lost { .. }) = &*kept {
+            return kept.clone().map_or(Ok(()), Err);
+        }
+        drop(kept);
         waited.map(drop).map_err(|error| self.lost(&error))
     }
 

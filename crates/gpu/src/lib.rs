@@ -98,6 +98,7 @@ mod memory;
 mod open;
 mod picture;
 mod pixels;
+mod readback;
 mod renderer;
 mod scene;
 mod scene_lighting;
@@ -122,7 +123,8 @@ pub use picture::{
     Samples,
 };
 pub use pixels::{Cost, HostPixels, LightLayer, NearestSample, Pixels, SampleObject};
+pub use readback::PendingPixels;
 pub use renderer::{Colors, Renderer};
-pub use scene::{HostImage, Missing, SceneError, SceneRenderer, missing, ray_counts};
+pub use scene::{HostImage, Missing, PendingImage, SceneError, SceneRenderer, missing, ray_counts};
 pub use spheres::{Centers, Encoding, Grid, KeyLength, Order, Radii, Spheres};
 pub use tree_need::{MAX_SPHERES, TreeNeed};

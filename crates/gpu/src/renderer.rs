@@ -6,15 +6,16 @@ use std::collections::BTreeMap;
 use bytemuck::{Pod, Zeroable};
 use wgpu::BindingResource;
 
-use crate::arrays::{Downloads, Uniform, Uniforms};
+use crate::arrays::{Array, Downloads, Uniform, Uniforms};
 use crate::batch::{Batch, DATA_BYTES, FILM_BYTES, MOST_RAYS, PixelNeed};
-use crate::commands::{Commands, Timer};
+use crate::commands::{Commands, Timer, times_bytes};
 use crate::denoise::Denoiser;
 use crate::kernels::{self, Kernels, Variant, tile_of};
 use crate::lighting::{Model, SceneUniform};
 use crate::memory::{layer_bytes, object_bytes};
 use crate::picture::{FilmSize, Picture, Samples, View};
 use crate::pixels::{Cost, HostPixels};
+use crate::readback::{KnownCost, LOST_WORDS, PendingPixels, Traced};
 use crate::spheres::Spheres;
 use crate::trace_arrays::TraceArrays;
 use crate::tree::{TreeBuilder, TreeShape};
@@ -22,8 +23,6 @@ use crate::{Device, GpuError};
 
 /// Invocations in a workgroup.
 const GROUP: u64 = kernels::GROUP as u64;
-/// Counters of the light that is lost.
-const LOST_WORDS: usize = 2;
 /// Largest number of stages whose time is kept; pictures of opaque spheres with more batches have several in a stage.
 const MAX_STAGES: u32 = 1025;
 /// Depths between two questions whether the rays of all pixels have ended, if spheres are transmissive. The last of these
@@ -80,18 +79,6 @@ pub struct Renderer {
     stages: u32,
     /// Seconds of stages before these.
     seconds_before: f64,
-}
-
-/// What is known of a picture on the device.
-#[derive(Debug, Clone, Copy)]
-struct Traced {
-    pixels: u64,
-    samples: u32,
-    sources: u32,
-    queues: u32,
-    is_denoised: bool,
-    has_objects: bool,
-    layers: u32,
 }
 
 impl Renderer {
@@ -295,6 +282,28 @@ impl Renderer {
         Batch::new(picture.ray_kinds(), need, picture.film.pixels(), limits)
     }
 
+    /// Starts to copy the picture that was started last, and what it and its frame have cost, to the host.
+    ///
+    /// # Errors
+    /// If the device fails.
+    ///
+    /// # Panics
+    /// Without a picture.
+    pub fn start_read(&self, device: &Device) -> Result<PendingPixels, GpuError> {
+        let Traced { pixels, samples, is_denoised, has_objects, layers, .. } = self.traced();
+        let film = FILM_BYTES * pixels;
+        self.download(
+            device,
+            [
+                (&self.arrays.film, film),
+                (self.denoiser.clean(), if is_denoised { film } else { 0 }),
+                (&self.arrays.data, DATA_BYTES * pixels),
+                (&self.arrays.objects, object_bytes(has_objects, samples) * pixels),
+                (&self.arrays.layers, layer_bytes(layers, false) * pixels),
+            ],
+        )
+    }
+
     /// Waits for the picture that was started last, and returns its pixels.
     ///
     /// # Errors
@@ -303,26 +312,7 @@ impl Renderer {
     /// # Panics
     /// Without a picture.
     pub fn read(&self, device: &Device) -> Result<HostPixels, GpuError> {
-        let Traced { pixels, samples, is_denoised, has_objects, layers, .. } =
-            self.traced.expect("a picture was traced");
-        let film = FILM_BYTES * pixels;
-        let parts = [
-            (&self.arrays.film, film),
-            (self.denoiser.clean(), if is_denoised { film } else { 0 }),
-            (&self.arrays.data, DATA_BYTES * pixels),
-            (&self.arrays.objects, object_bytes(has_objects, samples) * pixels),
-            (&self.arrays.layers, layer_bytes(layers, false) * pixels),
-        ];
-        let lengths = parts.map(|(_, length)| length);
-        let download = self.downloads.reserve(device, lengths.iter().sum())?;
-        let mut commands = Commands::new(device);
-        let mut at = 0;
-        for (array, length) in parts.into_iter().filter(|(_, length)| *length > 0) {
-            commands.copy(array, &download, [at, length]);
-            at += length;
-        }
-        commands.submit();
-        Ok(HostPixels::new(download.read(device)?, lengths))
+        Ok(self.start_read(device)?.wait(device)?.0)
     }
 
     /// Waits for the picture that was started last. Returns what it and its frame have cost.
@@ -333,34 +323,45 @@ impl Renderer {
     /// # Panics
     /// Without a picture.
     pub fn cost(&self, device: &Device) -> Result<Cost, GpuError> {
-        let Traced { pixels, samples, sources, queues, is_denoised, .. } =
-            self.traced.expect("a picture was traced");
-        let counts: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
-        let (lengths, lost) = counts.split_at(counts.len() - LOST_WORDS);
-        // The first queue of each depth has rays that go on, those of the sources shadow rays
-        let of_queue = |queue: u32| -> u64 {
-            lengths.iter().skip(queue as usize).step_by(queues as usize).sum()
-        };
-        let refracted = if queues > 1 + sources { of_queue(1 + sources) } else { 0 };
-        let seconds = match &self.timer {
-            Some(timer) => timer.seconds(device, self.stages)?,
-            None => Vec::new(),
-        };
-        // The last stage denoises
-        let tracing = seconds.len() - usize::from(is_denoised && !seconds.is_empty());
-        let arrays = self.arrays.all().iter().map(|array| array.bytes()).sum::<u64>();
-        Ok(Cost {
-            build_seconds: seconds.first().copied().unwrap_or_default(),
-            trace_seconds: self.seconds_before + seconds[..tracing].iter().skip(1).sum::<f64>(),
-            denoise_seconds: seconds[tracing..].iter().sum(),
-            primary_rays: pixels * u64::from(samples),
-            reflected_rays: of_queue(0) - refracted,
-            refracted_rays: refracted,
-            shadow_rays: (1..=sources).map(of_queue).sum(),
-            lost_steps: lost[0].saturating_add(lost[1].saturating_mul(1 << 32)),
-            bytes: self.tree.bytes() + arrays + self.denoiser.bytes(),
+        let pending = self.download(device, [(&self.arrays.film, 0); 5])?;
+        Ok(pending.wait(device)?.1)
+    }
+
+    fn traced(&self) -> Traced {
+        self.traced.expect("a picture was traced")
+    }
+
+    /// Starts to copy the first bytes of arrays, then the counts of rays and the times of stages.
+    fn download(
+        &self,
+        device: &Device,
+        arrays: [(&Array, u64); 5],
+    ) -> Result<PendingPixels, GpuError> {
+        let lengths = arrays.map(|(_, length)| length);
+        let counts = (&self.arrays.sums, self.arrays.sums.len());
+        let copied = || arrays.into_iter().chain([counts]).filter(|(_, length)| *length > 0);
+        let all: u64 = copied().map(|(_, length)| length).sum();
+        let times = self.timer.as_ref().map_or(0, |_| times_bytes(self.stages));
+        // Copies of times begin at multiples of eight bytes, as counts do
+        let download = self.downloads.reserve(device, all + times)?;
+        let mut commands = Commands::new(device);
+        let mut at = 0;
+        for (array, length) in copied() {
+            commands.copy(array, &download, [at, length]);
+            at += length;
+        }
+        if let Some(timer) = &self.timer {
+            commands.copy_times(timer, self.stages, &download, at);
+        }
+        let content = download.after(commands.submit());
+        let bytes = self.arrays.all().iter().map(|array| array.bytes()).sum::<u64>();
+        let cost = KnownCost {
+            traced: self.traced(),
+            seconds_before: self.seconds_before,
+            bytes: self.tree.bytes() + bytes + self.denoiser.bytes(),
             tree_bytes: self.tree.bytes(),
-        })
+        };
+        Ok(PendingPixels { content, lengths, counts: counts.1, cost })
     }
 
     fn reserve(

@@ -21,6 +21,7 @@ use spherule_tracer::scene::{
 };
 use spherule_tree::accel;
 use spherule_tree::blocks::StoredLeaves;
+use wgpu::SubmissionIndex;
 
 use crate::lighting::Model;
 use crate::memory::light_groups_of;
@@ -29,6 +30,7 @@ use crate::picture::{
     Samples,
 };
 use crate::pixels::{Cost, HostPixels, LightLayer, NearestSample, Pixels};
+use crate::readback::PendingPixels;
 use crate::renderer::{Colors, Renderer};
 use crate::scene_lighting::SceneLighting;
 use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
@@ -165,6 +167,8 @@ pub struct SceneRenderer {
     renderer: Renderer,
     samples: SampleTable,
     lighting: SceneLighting,
+    /// The picture that was started last.
+    last: Option<SubmissionIndex>,
 }
 
 impl SceneRenderer {
@@ -176,6 +180,7 @@ impl SceneRenderer {
             renderer,
             samples: SampleTable::default(),
             lighting: SceneLighting::default(),
+            last: None,
         }
     }
 
@@ -313,11 +318,31 @@ impl SceneRenderer {
         denoise: Option<DenoiseSettings>,
         stop: &dyn Stop,
     ) -> Result<(HostImage, Cost), SceneError> {
+        Ok(self.begin(scene, source, settings, denoise, stop)?.wait()?)
+    }
+
+    /// Starts the same, after the picture before the last one has ended. The next frame can be prepared meanwhile.
+    ///
+    /// # Errors
+    /// Same as [`Self::render_into`].
+    ///
+    /// # Panics
+    /// Same as [`Self::render_into`].
+    pub fn begin(
+        &mut self,
+        scene: &Scene,
+        source: &dyn ShadeSource,
+        settings: &RenderSettings,
+        denoise: Option<DenoiseSettings>,
+        stop: &dyn Stop,
+    ) -> Result<PendingImage, SceneError> {
         self.trace(scene, source, settings, denoise, stop)?;
-        let pixels = self.renderer.read(&self.device)?;
+        let pixels = self.renderer.start_read(&self.device)?;
+        if let Some(before) = self.last.replace(pixels.submission().clone()) {
+            self.device.wait_for(&before)?;
+        }
         stop.pixels_done(settings.width * settings.height);
-        let image = HostImage { pixels, samples: settings.samples };
-        Ok((image, self.renderer.cost(&self.device)?))
+        Ok(PendingImage { device: Arc::clone(&self.device), pixels, samples: settings.samples })
     }
 
     /// Builds the tree of the spheres that were prepared last once more, renders them, and leaves the picture on the
@@ -382,6 +407,35 @@ impl SceneRenderer {
             lights: &lights,
         };
         Ok(self.renderer.trace(&self.device, &picture, &|| stop.is_raised())?)
+    }
+}
+
+impl Drop for SceneRenderer {
+    /// The device may still use the memory.
+    fn drop(&mut self) {
+        if let Some(last) = &self.last {
+            // Who waits for the picture hears of its failure
+            let _ = self.device.wait_for(last);
+        }
+    }
+}
+
+/// An image that a device renders, or has rendered.
+#[derive(Debug)]
+pub struct PendingImage {
+    device: Arc<Device>,
+    pixels: PendingPixels,
+    samples: u32,
+}
+
+impl PendingImage {
+    /// Waits for the image. Returns it, and what it and its frame have cost.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn wait(self) -> Result<(HostImage, Cost), GpuError> {
+        let (pixels, cost) = self.pixels.wait(&self.device)?;
+        Ok((HostImage { pixels, samples: self.samples }, cost))
     }
 }
 
