@@ -36,6 +36,7 @@ mod emitter;
 mod photon_map;
 mod photons;
 mod sky;
+mod sky_noise;
 mod wet;
 
 /// Width of the border of the maps over which they fade to the light without particles, as a fraction of their edge.

@@ -4,6 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::super::{PathIntegrator, Surface};
+use super::sky_noise::{self, NoisyMap, remove_noise};
 use super::{Map, Square};
 use crate::render::{
     bsdf::surface_points,
@@ -40,7 +41,8 @@ const START: f32 = 1e-5;
 
 /// Memory for the map before and after it is smoothed, and for the paths of a row on each of up to 64 threads.
 pub(super) fn bytes(settings: &RenderSettings) -> u64 {
-    (SIDE * (4 * SIDE + 64 * path_count(settings)) * size_of::<Vec3>()) as u64
+    let rows = (SIDE * (6 * SIDE + 64 * path_count(settings)) * size_of::<Vec3>()) as u64;
+    rows + (SIDE * SIDE * sky_noise::BYTES) as u64
 }
 
 /// Memory of a map.
@@ -57,7 +59,7 @@ pub(super) struct SkyMaps {
 }
 
 /// Texels of a map, and of the map of each light group.
-type Texels = (Vec<Vec3>, Vec<Vec<Vec3>>);
+type Texels = (NoisyMap, Vec<Vec<Vec3>>);
 
 /// The radiance of a white ground in the light of the environment.
 pub(super) fn sky(
@@ -67,16 +69,20 @@ pub(super) fn sky(
 ) -> Option<(SkyMaps, RayCounts)> {
     let rows: Option<Vec<_>> =
         (0..SIDE).into_par_iter().map(|row| trace_row(integrator, square, row, stop)).collect();
-    let (mut texels, mut counts) = (Vec::with_capacity(SIDE * SIDE), RayCounts::default());
+    let empty = || Vec::with_capacity(SIDE * SIDE);
+    let mut all = NoisyMap { texels: empty(), differences: empty() };
+    let mut counts = RayCounts::default();
     let count = usize::from(integrator.context.settings.channels.layers.light_groups);
-    let mut groups = vec![Vec::with_capacity(SIDE * SIDE); count];
+    let mut groups = vec![empty(); count];
     for ((row, row_of_groups), of_row) in rows? {
-        texels.extend(row);
+        all.texels.extend(row.texels);
+        all.differences.extend(row.differences);
         for (texels, row) in groups.iter_mut().zip(row_of_groups) {
             texels.extend(row);
         }
         counts = counts + of_row;
     }
+    let texels = remove_noise(all, &mut groups, SIDE);
     let map = |texels| smoothed(&Map { side: SIDE, texels });
     let maps = SkyMaps { all: map(texels), groups: groups.into_iter().map(map).collect() };
     Some((maps, counts))
@@ -115,17 +121,23 @@ fn trace_row(
     })?;
     // Average the paths of each texel
     let radiance = |i: usize| lane3(&scratch.group.radiance[i / LANES], i % LANES);
-    let texels = means(paths, &radiance);
-    let of_group = |group| means(paths, &|path| scratch.group.layers.light_of_group(group, path));
+    let [even, odd] = [0, 1].map(|first| means(paths, first, 2, &radiance));
+    let halves = || even.iter().zip(&odd);
+    let all = NoisyMap {
+        texels: halves().map(|(even, odd)| 0.5 * (*even + *odd)).collect(),
+        differences: halves().map(|(even, odd)| *even - *odd).collect(),
+    };
+    let of_group =
+        |group| means(paths, 0, 1, &|path| scratch.group.layers.light_of_group(group, path));
     let groups = (0..usize::from(layers.light_groups)).map(of_group);
-    Some(((texels, groups.collect()), scratch.packet.counts))
+    Some(((all, groups.collect()), scratch.packet.counts))
 }
 
-/// The mean radiance of the `count` paths of each texel of a row.
-fn means(count: usize, radiance: &dyn Fn(usize) -> Vec3) -> Vec<Vec3> {
+/// The mean radiance of every `step`th of the `count` paths of each texel of a row.
+fn means(count: usize, first: usize, step: usize, radiance: &dyn Fn(usize) -> Vec3) -> Vec<Vec3> {
     let texel = |texel: usize| {
-        let paths = texel * count..(texel + 1) * count;
-        paths.map(radiance).sum::<Vec3>() / count as f32
+        let paths = (texel * count + first..(texel + 1) * count).step_by(step);
+        paths.map(radiance).sum::<Vec3>() * step as f32 / count as f32
     };
     (0..SIDE).map(texel).collect()
 }
