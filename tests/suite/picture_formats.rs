@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::harness::{SMALL, Workshop, dam_break, files, no_leftovers};
+use crate::harness::{JOB, SMALL, Workshop, dam_break, files, no_leftovers};
 
 /// Three frames in `in`.
 fn workshop() -> Workshop {
@@ -17,7 +17,7 @@ fn jobs_write_png_alone() {
     let workshop = workshop();
     let png = |options: &[&str]| {
         let render = ["render", "in", "-o", "png/f.####.png", "--transparent"];
-        workshop.run(&[&render[..], &SMALL, options].concat())
+        workshop.run(&[&render[..], &JOB, options].concat())
     };
     // Two of three frames, then the rest
     png(&["--frames", "1-2"]).expect(0);
@@ -37,7 +37,7 @@ fn jobs_write_png_alone() {
     // Isolated frames, too
     let isolated = [
         &["render", "in", "-o", "own/f.####.png", "--transparent"][..],
-        &SMALL,
+        &JOB,
         &["--isolate", "--frames", "2"],
     ];
     workshop.run(&isolated.concat()).expect(0);
