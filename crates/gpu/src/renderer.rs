@@ -2,6 +2,7 @@
 //! `shaders/path.wgsl` for the transport of light.
 
 use std::collections::BTreeMap;
+use std::mem::take;
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::BindingResource;
@@ -163,8 +164,7 @@ impl Renderer {
         picture: &Picture<'_>,
         is_stopped: &dyn Fn() -> bool,
     ) -> Result<(), GpuError> {
-        let batch = self.batch_of(device, picture);
-        self.reserve(device, picture, batch)?;
+        let batch = self.reserve_batch(device, picture)?;
         let shape = *self.tree.shape();
         assert_eq!(shape.has_motion, picture.exposure.is_some(), "both move, or none");
         let variant = Variant::of(picture, &shape, self.has_opacity, batch.samples);
@@ -362,6 +362,24 @@ impl Renderer {
             tree_bytes: self.tree.bytes(),
         };
         Ok(PendingPixels { content, lengths, counts: counts.1, cost })
+    }
+
+    /// Makes room for the batches of a picture. If memory is full, samples are traced one by one from then on.
+    fn reserve_batch(&mut self, device: &Device, picture: &Picture<'_>) -> Result<Batch, GpuError> {
+        let batch = self.batch_of(device, picture);
+        match self.reserve(device, picture, batch) {
+            Err(GpuError::OutOfMemory(_)) if batch.samples > 1 => {
+                // Free what was reserved, and the memory of the picture before
+                let colors = take(&mut self.arrays.colors);
+                self.arrays = TraceArrays::with_colors(colors);
+                device.wait()?;
+                self.most_rays = 0;
+                let single = self.batch_of(device, picture);
+                self.reserve(device, picture, single)?;
+                Ok(single)
+            }
+            reserved => reserved.map(|()| batch),
+        }
     }
 
     fn reserve(

@@ -30,6 +30,11 @@ pub(crate) struct TraceArrays {
 }
 
 impl TraceArrays {
+    /// No other arrays.
+    pub(crate) fn with_colors(colors: Array) -> Self {
+        Self { colors, ..Self::default() }
+    }
+
     pub(crate) fn all(&self) -> [&Array; 16] {
         let [rays, other_rays] = &self.rays;
         [
