@@ -194,7 +194,12 @@ impl Device {
             return kept.clone().map_or(Ok(()), Err);
         }
         drop(kept);
-        waited.map(drop).map_err(|error| self.lost(&error))
+        waited.map(drop).map_err(|error| {
+            // What was submitted has failed, and whatever follows will
+            let lost = self.lost(&error);
+            self.faults.keep(lost.clone());
+            lost
+        })
     }
 
     /// The first error since the last call, if there is one. A lost device stays lost.
