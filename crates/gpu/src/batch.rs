@@ -63,6 +63,7 @@ impl Batch {
         of(sizes.into_iter().find(|samples| fits(*samples)).unwrap_or(1))
     }
 
+    /// A batch of so many samples of each pixel.
     pub(crate) fn with(need: PixelNeed, samples: u32) -> Self {
         let before = if need.samples > 1 { [1 + u32::from(need.is_denoised), 1] } else { [0; 2] };
         let film = before[0] + samples * (1 + u32::from(need.has_clamp));
@@ -164,11 +165,9 @@ mod tests {
         let points: Vec<[f32; 2]> =
             (0..5).map(|i| [0.2 * i as f32, 0.9 - 0.2 * i as f32]).collect();
         let sets = [0; 41 * 23];
-        let picture = Picture::for_tests([41, 23], &sets);
-        let picture = Picture {
-            samples: Samples { count: 5, points: &points, ..picture.samples },
-            ..picture
-        };
+        let plain = Picture::for_tests([41, 23], &sets);
+        let samples = Samples { count: 5, points: &points, ..plain.samples };
+        let picture = Picture { samples, ..plain };
         let bytes = |most_rays: u64| {
             let mut renderer = Renderer::new(&device).with_most_rays(most_rays);
             renderer.prepare(&device, &spheres, Colors::Constant([0.5; 3])).unwrap();

@@ -72,7 +72,7 @@ pub(crate) struct Variant {
     levels: u32,
     /// Samples of a pixel that are traced together.
     batch: u32,
-    /// Whether these are all.
+    /// Whether pixels have no others.
     is_single: bool,
 }
 
