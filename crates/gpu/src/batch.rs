@@ -39,9 +39,11 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// The largest batch for a film with that many pixels of which at most `most_rays` are traced together, on a device
-    /// whose arrays have at most `max_array` bytes. With few rays at once, a device waits for the longest of them most of
-    /// the time. Paths through glass keep rays for each pixel, and layers of light are sums of one sample after the other.
+    /// The largest batch for a film of `pixels` with at most `most_rays` camera rays, whose arrays have at most `max_array`
+    /// bytes each. (A dispatch lasts as long as its longest ray, so that small dispatches leave most of a device idle.)
+    ///
+    /// It is one sample with glass, where each pixel keeps rays, and with layers of light, which add up one sample after
+    /// the other.
     pub(crate) fn new(
         rays: RayKinds,
         need: PixelNeed,

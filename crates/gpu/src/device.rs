@@ -4,7 +4,7 @@
 //! each wait for the device, returns it.
 
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use wgpu::{
     Adapter, Backends, DeviceDescriptor, DeviceType, Error, Features, Instance, InstanceDescriptor,
@@ -74,8 +74,12 @@ fn summary(adapter: &Adapter) -> AdapterSummary {
 struct Faults(Mutex<Option<GpuError>>);
 
 impl Faults {
+    fn lock(&self) -> MutexGuard<'_, Option<GpuError>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn keep(&self, fault: GpuError) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.lock();
         // The loss of the device is the reason of all other errors
         if kept.is_none() || matches!(fault, GpuError::Lost { .. }) {
             *kept = Some(fault);
@@ -189,11 +193,9 @@ impl Device {
         let submission_index = Some(submission.clone());
         let waited = self.raw.poll(PollType::Wait { submission_index, timeout: None });
         // Other errors are those of who submits
-        let kept = self.faults.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(GpuError::Lost { .. }) = &*kept {
-            return kept.clone().map_or(Ok(()), Err);
+        if let Some(lost @ GpuError::Lost { .. }) = &*self.faults.lock() {
+            return Err(lost.clone());
         }
-        drop(kept);
         waited.map(drop).map_err(|error| {
             // What was submitted has failed, and whatever follows will
             let lost = self.lost(&error);
@@ -204,7 +206,7 @@ impl Device {
 
     /// The first error since the last call, if there is one. A lost device stays lost.
     pub(crate) fn check(&self) -> Result<(), GpuError> {
-        let mut kept = self.faults.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.faults.lock();
         let found = match &*kept {
             Some(GpuError::Lost { .. }) => kept.clone(),
             _ => kept.take(),
