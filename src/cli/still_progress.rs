@@ -1,6 +1,6 @@
 //! `still --progress`: how much of the picture is traced.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -17,14 +17,15 @@ const PLAIN_PARTS: u64 = 10;
 pub(super) struct StillProgress {
     display: Display,
     pixels: u64,
-    done: AtomicU64,
+    /// Number of traced pixels. It is locked while a percent is shown, so that threads show them in order.
+    done: Mutex<u64>,
 }
 
 impl StillProgress {
     /// Progress of a picture with that many pixels.
     pub(super) fn new(mode: ProgressMode, pixels: u64) -> Self {
         let display = Display::new(mode, bar, Display::Nothing);
-        Self { display, pixels: pixels.max(1), done: AtomicU64::new(0) }
+        Self { display, pixels: pixels.max(1), done: Mutex::new(0) }
     }
 
     /// Calls `print` while there is no bar.
@@ -57,9 +58,11 @@ impl Stop for StillProgress {
     }
 
     fn pixels_done(&self, count: u32) {
-        let before = self.done.fetch_add(u64::from(count), Ordering::Relaxed);
         let percent = |done: u64| (100 * done / self.pixels).min(100);
-        for reached in percent(before) + 1..=percent(before + u64::from(count)) {
+        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = *done;
+        *done += u64::from(count);
+        for reached in percent(before) + 1..=percent(*done) {
             self.show(reached);
         }
     }
