@@ -6,7 +6,8 @@ use std::thread;
 use serde::de::DeserializeOwned;
 use spherule_jobs::discard_own_parts;
 
-use super::{CliError, INTERRUPTED};
+use super::CliError;
+use super::signals::exit_at_once;
 
 /// Reads the task. From then on the process ends with its parent. `parent_command` is the
 /// command that creates such tasks.
@@ -33,5 +34,5 @@ fn exit_with_parent() {
     let mut rest = [0; 64];
     while io::stdin().read(&mut rest).is_ok_and(|n| n > 0) {}
     discard_own_parts();
-    std::process::exit(i32::from(INTERRUPTED));
+    exit_at_once();
 }

@@ -122,5 +122,11 @@ fn exit_now(messages: SignalMessages) -> ! {
     message!("{}", messages.stopped);
     discard_own_parts();
     events::end_at_once(INTERRUPTED);
-    std::process::exit(i32::from(INTERRUPTED));
+    exit_at_once()
+}
+
+/// Ends the process with [`INTERRUPTED`] while other threads work. Functions that libraries have registered for the end of
+/// the process are not called: that of a driver would wait for all that its GPU has to do, or crash under these threads.
+pub(super) fn exit_at_once() -> ! {
+    signal_hook::low_level::exit(i32::from(INTERRUPTED))
 }

@@ -110,6 +110,9 @@ fn failed(error: GpuError) -> TraceError {
             *lock(&DEVICE) = None;
             TraceError::Device(format!("{error}; run the command again to render the frame"))
         }
+        GpuError::OutOfMemory => TraceError::Device(format!(
+            "{error}; end other programs that use it, choose a smaller image, or render with --device cpu"
+        )),
         _ => TraceError::Device(error.to_string()),
     }
 }

@@ -173,7 +173,7 @@ mod tests {
         let bytes = |most_rays: u64| {
             let mut renderer = Renderer::new(&device).with_most_rays(most_rays);
             renderer.prepare(&device, &spheres, Colors::Constant([0.5; 3])).unwrap();
-            renderer.trace(&device, &picture, &|| false).unwrap();
+            renderer.trace(&device, &picture, &|_| false).unwrap();
             let image = renderer.read(&device).unwrap();
             let pixels = image.pixels();
             (pixels.sums.to_vec(), bytemuck::cast_slice::<_, u8>(pixels.nearest).to_vec())

@@ -258,7 +258,7 @@ fn check_limits(adapter: &Adapter) -> Result<(), GpuError> {
 
 fn fault_of(error: &Error) -> GpuError {
     match error {
-        Error::OutOfMemory { source } => GpuError::OutOfMemory(source.to_string()),
+        Error::OutOfMemory { .. } => GpuError::OutOfMemory,
         Error::Validation { description, .. } | Error::Internal { description, .. } => {
             GpuError::Driver(description.clone())
         }

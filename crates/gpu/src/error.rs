@@ -57,8 +57,8 @@ pub enum GpuError {
         max: u64,
     },
     /// The memory of the device is full.
-    #[error("the memory of the GPU is full: {0}")]
-    OutOfMemory(String),
+    #[error("the memory of the GPU is full")]
+    OutOfMemory,
     /// The device is gone: another program reset it, or the driver stopped a kernel that took too long.
     #[error("{adapter} was lost: {message}")]
     Lost {

@@ -75,7 +75,7 @@
 //!         group: 0,
 //!     }],
 //! };
-//! renderer.trace(&device, &picture, &|| false)?;
+//! renderer.trace(&device, &picture, &|_| false)?;
 //! let image = renderer.read(&device)?;
 //! let nearest = image.pixels().nearest;
 //! assert_eq!((nearest[4 * 16 + 4].index, nearest[4 * 16 + 12].index), (0, 1));

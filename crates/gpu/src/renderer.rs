@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::mem::take;
 
 use bytemuck::{Pod, Zeroable};
-use wgpu::BindingResource;
+use wgpu::{BindingResource, SubmissionIndex};
 
 use crate::arrays::{Array, Downloads, Uniform, Uniforms};
 use crate::batch::{Batch, DATA_BYTES, FILM_BYTES, MOST_RAYS, PixelNeed};
@@ -26,6 +26,9 @@ use crate::{Device, GpuError};
 const GROUP: u64 = kernels::GROUP as u64;
 /// Largest number of stages whose time is kept; pictures of opaque spheres with more batches have several in a stage.
 const MAX_STAGES: u32 = 1025;
+/// Parts of a picture that are submitted before the first of them has ended: the device need not wait for the host, and
+/// neither a stop nor the progress waits for hundreds of samples.
+const PARTS_AHEAD: usize = 4;
 /// Depths between two questions whether the rays of all pixels have ended, if spheres are transmissive. The last of these
 /// depths writes the same queue as the first.
 const DEPTHS_OF_GLASS: u32 = 33;
@@ -153,7 +156,8 @@ impl Renderer {
     /// Starts to render a picture of the frame that was prepared last. [`Self::read`] has the result.
     ///
     /// # Errors
-    /// If `is_stopped` returns true, which is asked after each part of the picture, or if the device fails.
+    /// If `is_stopped` returns true, or if the device fails. It is asked before each part of the picture, with the number
+    /// of pixels that the device has done: of half the samples, half of them.
     ///
     /// # Panics
     /// If the picture has too many lights, or no set of samples for each pixel, or if it has an exposure and the spheres have
@@ -162,7 +166,7 @@ impl Renderer {
         &mut self,
         device: &Device,
         picture: &Picture<'_>,
-        is_stopped: &dyn Fn() -> bool,
+        is_stopped: &dyn Fn(u64) -> bool,
     ) -> Result<(), GpuError> {
         let batch = self.reserve_batch(device, picture)?;
         let shape = *self.tree.shape();
@@ -178,7 +182,15 @@ impl Renderer {
             _ => 1,
         };
         (self.stages, self.seconds_before) = (1, 0.0);
-        for batches in plan.batches.chunks(per_stage) {
+        let parts = plan.batches.chunks(per_stage);
+        let count = parts.len();
+        let mut submitted = Vec::with_capacity(count);
+        for (part, batches) in parts.enumerate() {
+            let ended = (part + 1).saturating_sub(PARTS_AHEAD);
+            if let Some(last) = ended.checked_sub(1) {
+                device.wait_for(&submitted[last])?;
+            }
+            let is_stopped = || is_stopped(picture.film.pixels() * ended as u64 / count as u64);
             if is_stopped() {
                 device.wait()?;
                 return Err(GpuError::Interrupted);
@@ -187,8 +199,8 @@ impl Renderer {
             for first in batches {
                 self.add_batch(&mut commands, &self.kernels[&variant], &plan, *first);
             }
-            self.submit_stage(device, commands)?;
-            self.trace_kept(device, &plan, variant, batches, is_stopped)?;
+            submitted.push(self.submit_stage(device, commands)?);
+            self.trace_kept(device, &plan, variant, batches, &is_stopped)?;
         }
         self.denoise(device, &plan, variant, picture)?;
         self.traced = Some(Traced {
@@ -221,7 +233,7 @@ impl Renderer {
         let array_of = |binding| self.array(binding, plan, [plan.batches[0], plan.depths[0]], 0);
         commands.add(store, &array_of, plan.film.pixels(), GROUP);
         self.denoiser.add(device, &mut commands, picture, denoising, &self.arrays.film)?;
-        self.submit_stage(device, commands)
+        self.submit_stage(device, commands).map(drop)
     }
 
     /// Starts the dispatches of a stage, whose time is measured. If that of no more stages can be kept, adds up those so far.
@@ -229,15 +241,14 @@ impl Renderer {
         &mut self,
         device: &Device,
         mut commands: Commands<'_>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<SubmissionIndex, GpuError> {
         if let (MAX_STAGES, Some(timer)) = (self.stages, &self.timer) {
             self.seconds_before += timer.seconds(device, MAX_STAGES)?.iter().skip(1).sum::<f64>();
             self.stages = 1;
         }
         commands.end_stage(self.timer.as_ref().map(|timer| (timer, self.stages)));
-        commands.submit();
         self.stages += 1;
-        Ok(())
+        Ok(commands.submit())
     }
 
     /// Traces what is left of a sample with transmissive spheres, until the rays of all pixels have ended.
@@ -368,7 +379,7 @@ impl Renderer {
     fn reserve_batch(&mut self, device: &Device, picture: &Picture<'_>) -> Result<Batch, GpuError> {
         let batch = self.batch_of(device, picture);
         match self.reserve(device, picture, batch) {
-            Err(GpuError::OutOfMemory(_)) if batch.samples > 1 => {
+            Err(GpuError::OutOfMemory) if batch.samples > 1 => {
                 // Free what was reserved, and the memory of the picture before
                 let colors = take(&mut self.arrays.colors);
                 self.arrays = TraceArrays::with_colors(colors);

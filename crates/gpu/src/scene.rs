@@ -1,5 +1,6 @@
 //! Scenes of the tracer on a device: what the device lacks, and films of its pictures.
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
@@ -341,7 +342,6 @@ impl SceneRenderer {
         if let Some(before) = self.last.replace(pixels.submission().clone()) {
             self.device.wait_for(&before)?;
         }
-        stop.pixels_done(settings.width * settings.height);
         Ok(PendingImage { device: Arc::clone(&self.device), pixels, samples: settings.samples })
     }
 
@@ -406,7 +406,18 @@ impl SceneRenderer {
             split_weight: settings.min_weight,
             lights: &lights,
         };
-        Ok(self.renderer.trace(&self.device, &picture, &|| stop.is_raised())?)
+        let shown = Cell::new(0);
+        let show = |done: u64| {
+            let more = done - shown.replace(done);
+            stop.pixels_done(u32::try_from(more).unwrap_or(u32::MAX));
+        };
+        self.renderer.trace(&self.device, &picture, &|done| {
+            show(done);
+            stop.is_raised()
+        })?;
+        // The last parts follow soon
+        show(size.pixels());
+        Ok(())
     }
 }
 

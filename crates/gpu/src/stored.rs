@@ -159,7 +159,7 @@ mod tests {
         };
         renderer.prepare(device, &spheres, Colors::Constant([0.5; 3])).unwrap();
         let picture = Picture::for_tests([64, 48], &[0; 64 * 48]);
-        renderer.trace(device, &picture, &|| false).unwrap();
+        renderer.trace(device, &picture, &|_| false).unwrap();
         renderer.read(device).unwrap().pixels().nearest.to_vec()
     }
 

@@ -6,8 +6,8 @@
 #[path = "../examples/support/mod.rs"]
 mod support;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 
 use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
 use spherule_tracer::render::Stop;
@@ -310,6 +310,40 @@ fn a_raised_flag_stops_a_picture() {
     let error =
         support::stopped(&mut renderer, &Case::small(), &AtomicBool::new(true)).unwrap_err();
     assert_eq!(error.to_string(), "interrupted");
+}
+
+/// Remembers what is done. Is raised as soon as a part of the picture is, or never.
+struct Parts {
+    done: Mutex<Vec<u32>>,
+    is_raised_by_first: bool,
+}
+
+impl Stop for Parts {
+    fn is_raised(&self) -> bool {
+        self.is_raised_by_first && self.done.lock().unwrap().iter().any(|count| *count > 0)
+    }
+
+    fn pixels_done(&self, count: u32) {
+        self.done.lock().unwrap().push(count);
+    }
+}
+
+#[test]
+fn long_pictures_show_their_progress_and_can_be_stopped() {
+    let Some(device) = device(Checks::Off) else { return };
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    // Seven batches, and the first has ended before the fifth is started
+    let case = Case { samples: 7 * 16, ..Case::small() };
+    let [all, first] = [false, true]
+        .map(|is_raised_by_first| Parts { done: Mutex::default(), is_raised_by_first });
+    support::stopped(&mut renderer, &case, &all).unwrap();
+    let done = all.done.into_inner().unwrap();
+    let pixels = case.width * case.height;
+    assert_eq!(done.iter().sum::<u32>(), pixels);
+    assert_eq!(done[..5], [0, 0, 0, 0, pixels / 7], "{done:?}");
+    let error = support::stopped(&mut renderer, &case, &first).unwrap_err();
+    assert_eq!(error.to_string(), "interrupted");
+    assert_eq!(first.done.into_inner().unwrap(), done[..5]);
 }
 
 /// Loses the device when it is asked for the second time, in the middle of a picture.
