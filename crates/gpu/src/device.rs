@@ -165,6 +165,12 @@ impl Device {
         self.raw.features().contains(Features::SUBGROUP)
     }
 
+    /// The same, if 32 to 64 of them do.
+    pub(crate) fn has_large_subgroups(&self) -> bool {
+        let info = self.raw.adapter_info();
+        self.has_subgroups() && info.subgroup_min_size >= 32 && info.subgroup_max_size <= 64
+    }
+
     /// Gives the device up, as if the driver had: for tests.
     pub fn destroy(&self) {
         self.raw.destroy();

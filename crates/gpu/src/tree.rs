@@ -360,13 +360,13 @@ impl TreeBuilder {
                 ..build
             };
             step(Kind::BlockBoxes, 0, part, children, 256);
-            step(Kind::BuildLevel, 1, part, nodes, 64);
+            step(Kind::BuildLevel, 1, part, WIDTH * nodes, 64);
         }
         let sizes = level_sizes(blocks);
         let (mut children, mut boxes) = (sizes[0], 0);
         for (size, first) in sizes.into_iter().zip(shape.starts).skip(1) {
             let build = Build { children: narrow(children), nodes: narrow(size), first, ..build };
-            step(Kind::BuildLevel, boxes, build, size, 64);
+            step(Kind::BuildLevel, boxes, build, WIDTH * size, 64);
             (children, boxes) = (size, 1 - boxes);
         }
     }
@@ -392,7 +392,7 @@ impl TreeBuilder {
         let (mut children, mut boxes) = (blocks, 1 - side);
         for (size, first) in level_sizes(blocks).into_iter().zip(shape.starts) {
             let build = Build { children: narrow(children), nodes: narrow(size), first, ..build };
-            step(Kind::BuildLevel, boxes, build, size, 64);
+            step(Kind::BuildLevel, boxes, build, WIDTH * size, 64);
             (children, boxes) = (size, 1 - boxes);
         }
     }

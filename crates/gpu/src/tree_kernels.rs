@@ -48,7 +48,12 @@ pub(crate) struct SortKernels {
 
 impl SortKernels {
     pub(crate) fn new(device: &Device) -> Self {
-        let module = device.module(&[BUILD, include_str!("shaders/sort.wgsl")].concat());
+        let rank = if device.has_large_subgroups() {
+            include_str!("shaders/rank_subgroup.wgsl")
+        } else {
+            include_str!("shaders/rank_plain.wgsl")
+        };
+        let module = device.module(&[BUILD, include_str!("shaders/sort.wgsl"), rank].concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
             histogram: kernel("histogram", &[0, 3, 5]),

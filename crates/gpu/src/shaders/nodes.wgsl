@@ -20,51 +20,70 @@ fn write_box(i: u32, low: vec3<f32>, high: vec3<f32>) {
   }
 }
 
-// The nodes of a level, and their boxes.
+// Boxes of the children, and their planes on the grid of the node
+var<workgroup> lows: array<vec3<f32>, 64>;
+var<workgroup> highs: array<vec3<f32>, 64>;
+var<workgroup> lower: array<vec3<u32>, 64>;
+var<workgroup> upper: array<vec3<u32>, 64>;
+
+// The bytes of four numbers from `first` on, on an axis.
+fn lower_word(first: u32, axis: u32) -> u32 {
+  return lower[first][axis] | (lower[first + 1u][axis] << 8u) | (lower[first + 2u][axis] << 16u)
+    | (lower[first + 3u][axis] << 24u);
+}
+
+fn upper_word(first: u32, axis: u32) -> u32 {
+  return upper[first][axis] | (upper[first + 1u][axis] << 8u) | (upper[first + 2u][axis] << 16u)
+    | (upper[first + 3u][axis] << 24u);
+}
+
+// The nodes of a level, and their boxes: one invocation for each child.
 @compute @workgroup_size(64)
 fn build_level(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local, 64u);
-  if (i >= build.nodes) { return; }
-  // Unite the boxes of the children
-  let first = 8u * i;
-  let count = min(8u, build.children - first);
+  let child = linear_index(group, groups, local, 64u);
+  var own_low = vec3<f32>(LARGEST);
+  var own_high = vec3<f32>(-LARGEST);
+  if (child < build.children) {
+    let at = 6u * child;
+    own_low = vec3<f32>(boxes_in[at], boxes_in[at + 1u], boxes_in[at + 2u]);
+    own_high = vec3<f32>(boxes_in[at + 3u], boxes_in[at + 4u], boxes_in[at + 5u]);
+  }
+  lows[local] = own_low;
+  highs[local] = own_high;
+  workgroupBarrier();
+  // Unite the boxes of the children, and leave out empty ones
+  let first = local & ~7u;
   var low = vec3<f32>(LARGEST);
   var high = vec3<f32>(-LARGEST);
-  for (var j = 0u; j < count; j++) {
-    let at = 6u * (first + j);
-    low = min(low, vec3<f32>(boxes_in[at], boxes_in[at + 1u], boxes_in[at + 2u]));
-    high = max(high, vec3<f32>(boxes_in[at + 3u], boxes_in[at + 4u], boxes_in[at + 5u]));
-  }
-  write_box(build.nodes_before + i, low, high);
-  // Leave out empty children
   var mask = 0u;
-  for (var j = 0u; j < count; j++) {
-    let at = 6u * (first + j);
-    if (boxes_in[at] <= boxes_in[at + 3u]) { mask |= 1u << j; }
+  for (var j = 0u; j < 8u; j++) {
+    low = min(low, lows[first + j]);
+    high = max(high, highs[first + j]);
+    mask |= select(0u, 1u << j, lows[first + j].x <= highs[first + j].x);
   }
   // Round the planes of the others outwards to a grid of 255 steps, whose width is a power of two
-  var exponents: vec3<u32>;
-  var planes: array<vec4<u32>, 3>;
-  for (var axis = 0u; axis < 3u; axis++) {
-    exponents[axis] = clamp((bitcast<u32>((high[axis] - low[axis]) / 254.0) >> 23u) + 1u, 1u, 254u);
-    let steps = 1.0 / bitcast<f32>(exponents[axis] << 23u);
-    for (var j = 0u; j < count; j++) {
-      let at = 6u * (first + j) + axis;
-      let lower = u32(clamp(floor((boxes_in[at] - low[axis]) * steps), 0.0, 255.0));
-      let upper = u32(clamp(ceil((boxes_in[at + 3u] - low[axis]) * steps), 0.0, 255.0));
-      let shift = 8u * (j & 3u);
-      planes[axis][j >> 2u] |= lower << shift;
-      planes[axis][2u + (j >> 2u)] |= upper << shift;
-    }
-  }
+  let exponents = clamp(
+    (bitcast<vec3<u32>>((high - low) / 254.0) >> vec3<u32>(23u)) + vec3<u32>(1u), vec3<u32>(1u), vec3<u32>(254u));
+  let steps = 1.0 / bitcast<vec3<f32>>(exponents << vec3<u32>(23u));
+  lower[local] = vec3<u32>(clamp(floor((own_low - low) * steps), vec3<f32>(0.0), vec3<f32>(255.0)));
+  upper[local] = vec3<u32>(clamp(ceil((own_high - low) * steps), vec3<f32>(0.0), vec3<f32>(255.0)));
+  workgroupBarrier();
+  // Four invocations write one vector each
+  let i = child >> 3u;
+  let part = local & 7u;
+  if (i >= build.nodes || part >= 4u) { return; }
   let at = 4u * (build.first + i);
-  let grid = exponents.x | (exponents.y << 8u) | (exponents.z << 16u) | (mask << 24u);
-  nodes[at] = vec4<u32>(bitcast<u32>(low.x), bitcast<u32>(low.y), bitcast<u32>(low.z), grid);
-  nodes[at + 1u] = planes[0];
-  nodes[at + 2u] = planes[1];
-  nodes[at + 3u] = planes[2];
+  if (part == 0u) {
+    let grid = exponents.x | (exponents.y << 8u) | (exponents.z << 16u) | (mask << 24u);
+    nodes[at] = vec4<u32>(bitcast<vec3<u32>>(low), grid);
+    write_box(build.nodes_before + i, low, high);
+    return;
+  }
+  let axis = part - 1u;
+  nodes[at + part] = vec4<u32>(
+    lower_word(first, axis), lower_word(first + 4u, axis), upper_word(first, axis), upper_word(first + 4u, axis));
 }

@@ -1,8 +1,9 @@
 // A stable radix sort of pairs, 8 bits in each pass (Satish, Harris and Garland, "Designing efficient sorting algorithms
-// for manycore GPUs", 2009). It uses no subgroup operations, so that it runs on every device.
+// for manycore GPUs", 2009).
 //
 // A pass has three dispatches: `histogram` counts the digits of each tile, `scan_digits` turns the counts into starts,
-// and `scatter` orders each tile in workgroup memory and writes runs of equal digits.
+// and `scatter` orders each tile in workgroup memory and writes runs of equal digits. `rank_subgroup.wgsl` or
+// `rank_plain.wgsl` ranks the pairs of a tile.
 
 @group(0) @binding(3) var<storage, read> pairs_in: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> pairs_out: array<vec2<u32>>;
@@ -73,12 +74,17 @@ fn scan_digits(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
   if (local == 0u) { totals[group.x] = carry; }
 }
 
-// By digit: the next rank of a pair in the tile, then the place in the output relative to that in the tile
-var<workgroup> base: array<u32, 256>;
+// By digit: where its pairs start in the tile, then where they start in the output, relative to that
 var<workgroup> starts: array<u32, 256>;
-// For each 32 invocations, a mask of those with each digit
-var<workgroup> masks: array<atomic<u32>, 2048>;
+var<workgroup> base: array<u32, 256>;
 var<workgroup> ordered_pairs: array<vec2<u32>, TILE>;
+
+// An invocation: its group of `size` neighbours, and its number in this group
+struct Lane { group: u32, number: u32, size: u32 }
+
+// The pairs of an invocation, and how many of the same digit are before each in the tile
+var<private> pairs: array<vec2<u32>, ROUNDS>;
+var<private> ranks: array<u32, ROUNDS>;
 
 // The exclusive sum of `own` over the workgroup, through `starts`.
 fn scan_group(local: u32, own: u32) -> u32 {
@@ -94,56 +100,24 @@ fn scan_group(local: u32, own: u32) -> u32 {
   return starts[local] - own;
 }
 
-@compute @workgroup_size(256)
-fn scatter(
-  @builtin(workgroup_id) group: vec3<u32>,
-  @builtin(num_workgroups) groups: vec3<u32>,
-  @builtin(local_invocation_index) local: u32,
-) {
-  let tile = group.y * groups.x + group.x;
+fn scatter_tile(tile: u32, lane: Lane) {
   if (tile >= build.tiles) { return; }
+  let local = lane.group * lane.size + lane.number;
   // Read the tile, and find where its pairs with digit `local` go
-  var pairs: array<vec2<u32>, ROUNDS>;
-  var ranks: array<u32, ROUNDS>;
   let first = tile * TILE;
   let valid = min(TILE, build.count - first);
   for (var round = 0u; round < ROUNDS; round++) {
-    let i = round * DIGITS + local;
+    let i = place_of(round, lane);
     if (i < valid) { pairs[round] = pairs_in[first + i]; }
   }
   let output_start = scan_group(local, totals[local]) + counts[local * build.tiles + tile];
-  // Rank each pair among those with its digit, in the order of the input
-  var seen = 0u;
-  base[local] = 0u;
-  for (var warp = 0u; warp < 8u; warp++) { atomicStore(&masks[warp * DIGITS + local], 0u); }
-  let own_warp = local >> 5u;
-  let bit = 1u << (local & 31u);
-  workgroupBarrier();
-  for (var round = 0u; round < ROUNDS; round++) {
-    let is_valid = round * DIGITS + local < valid;
-    let d = digit(pairs[round].x);
-    if (is_valid) { atomicOr(&masks[own_warp * DIGITS + d], bit); }
-    workgroupBarrier();
-    if (is_valid) {
-      var rank = base[d] + countOneBits(atomicLoad(&masks[own_warp * DIGITS + d]) & (bit - 1u));
-      for (var warp = 0u; warp < own_warp; warp++) { rank += countOneBits(atomicLoad(&masks[warp * DIGITS + d])); }
-      ranks[round] = rank;
-    }
-    workgroupBarrier();
-    for (var warp = 0u; warp < 8u; warp++) {
-      seen += countOneBits(atomicLoad(&masks[warp * DIGITS + local]));
-      atomicStore(&masks[warp * DIGITS + local], 0u);
-    }
-    base[local] = seen;
-    workgroupBarrier();
-  }
   // Order the tile, so that neighbours write to neighbours
-  let tile_start = scan_group(local, seen);
+  let tile_start = scan_group(local, rank_pairs(valid, lane));
   base[local] = output_start - tile_start;
   starts[local] = tile_start;
   workgroupBarrier();
   for (var round = 0u; round < ROUNDS; round++) {
-    if (round * DIGITS + local < valid) {
+    if (place_of(round, lane) < valid) {
       ordered_pairs[starts[digit(pairs[round].x)] + ranks[round]] = pairs[round];
     }
   }

@@ -44,21 +44,39 @@ fn radius_of(sphere: vec4<f32>) -> f32 {
   return sphere.w;
 }
 
-// The distance to the sphere from outside, or from inside if the ray starts there; negative or NaN without one. The
-// discriminant uses the vector from the centre to the line (Haines et al., "Precision improvements for ray/sphere
-// intersection", 2019).
-fn distance_to(sphere: vec4<f32>, ray: Ray) -> f32 {
+// The line of a ray and a sphere: the distance to its point nearest to the centre, and the square of half the chord, which
+// is negative without an intersection, or NaN. The discriminant uses the vector from the centre to the line (Haines et al.,
+// "Precision improvements for ray/sphere intersection", 2019).
+struct Chord { middle: f32, discriminant: f32 }
+
+fn chord_of(sphere: vec4<f32>, ray: Ray) -> Chord {
   let to_center = sphere.xyz - ray.origin;
   let middle = test_dot(to_center, ray.direction);
   let across = test_minus(to_center, middle, ray.direction);
   let radius = radius_of(sphere);
   // A plain product could be fused with the subtraction
-  let discriminant = mul(radius, radius) - test_dot(across, across);
-  if (!(discriminant >= 0.0)) { return -1.0; }
-  let half = root(discriminant);
-  let near = middle - half;
+  return Chord(middle, mul(radius, radius) - test_dot(across, across));
+}
+
+// The spheres of a block whose surfaces the line of a ray meets, as a mask. Neighbouring invocations find these together,
+// and the distances to the few that are left one after the other.
+fn candidates_of(block: u32, ray: Ray) -> u32 {
+  var mask = 0u;
+  for (var j = 0u; j < BLOCK; j++) {
+    let chord = chord_of(sphere_at(block * BLOCK + j, ray.time), ray);
+    mask |= select(0u, 1u << j, chord.discriminant >= 0.0);
+  }
+  return mask;
+}
+
+// The distance to a sphere that the line of the ray meets, from outside, or from inside if the ray starts there; negative
+// if it is behind the origin.
+fn distance_to(sphere: vec4<f32>, ray: Ray) -> f32 {
+  let chord = chord_of(sphere, ray);
+  let half = root(chord.discriminant);
+  let near = chord.middle - half;
   if (HAS_OPACITY) { return near; }
-  return select(middle + half, near, near >= 0.0);
+  return select(chord.middle + half, near, near >= 0.0);
 }
 
 // The bytes of a word as floats.
@@ -140,8 +158,10 @@ fn nearest_behind(last: Hit, ray: Ray, limit: f32) -> Hit {
     let level = at >> 28u;
     let index = at & 0x0fffffffu;
     if (level == 0u) {
-      for (var j = 0u; j < BLOCK; j++) {
-        let slot = index * BLOCK + j;
+      var candidates = candidates_of(index, ray);
+      while (candidates != 0u) {
+        let slot = index * BLOCK + firstTrailingBit(candidates);
+        candidates &= candidates - 1u;
         let t = distance_to(sphere_at(slot, ray.time), ray);
         if (t >= 0.0 && t <= hit.t) {
           let found = index_of(slot);
@@ -208,14 +228,10 @@ fn nearest(ray: Ray, limit: f32, u: f32) -> Hit {
 // The part of the light that passes a sphere straight through, at the points of the ray before `limit`.
 fn passing_sphere(slot: u32, ray: Ray, limit: f32) -> f32 {
   let sphere = sphere_at(slot, ray.time);
-  let to_center = sphere.xyz - ray.origin;
-  let middle = test_dot(to_center, ray.direction);
-  let across = test_minus(to_center, middle, ray.direction);
-  let radius = radius_of(sphere);
-  let discriminant = mul(radius, radius) - test_dot(across, across);
-  if (!(discriminant >= 0.0)) { return 1.0; }
-  let half = root(discriminant);
-  let part = straight_transmittance(half / radius);
+  let chord = chord_of(sphere, ray);
+  let middle = chord.middle;
+  let half = root(chord.discriminant);
+  let part = straight_transmittance(half / radius_of(sphere));
   var product = 1.0;
   if (middle - half >= 0.0 && middle - half < limit) { product *= part; }
   if (middle + half >= 0.0 && middle + half < limit) { product *= part; }
@@ -234,8 +250,10 @@ fn transmittance(ray: Ray, limit: f32, is_straight: bool) -> f32 {
     let level = at >> 28u;
     let index = at & 0x0fffffffu;
     if (level == 0u) {
-      for (var j = 0u; j < BLOCK; j++) {
-        let slot = index * BLOCK + j;
+      var candidates = candidates_of(index, ray);
+      while (candidates != 0u) {
+        let slot = index * BLOCK + firstTrailingBit(candidates);
+        candidates &= candidates - 1u;
         if (HAS_GLASS && is_straight) {
           product *= passing_sphere(slot, ray, limit);
           if (product < CLEAR_DARK) { return 0.0; }
