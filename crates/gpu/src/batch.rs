@@ -23,8 +23,8 @@ pub(crate) struct PixelNeed {
     pub(crate) samples: u32,
     /// Whether the film has the sums over every second sample.
     pub(crate) is_denoised: bool,
-    /// Whether indirect light has a limit.
-    pub(crate) has_clamp: bool,
+    /// Whether samples have a second colour.
+    pub(crate) has_second: bool,
 }
 
 /// How many planes of pixels the arrays have.
@@ -68,7 +68,7 @@ impl Batch {
     /// A batch of so many samples of each pixel.
     pub(crate) fn with(need: PixelNeed, samples: u32) -> Self {
         let before = if need.samples > 1 { [1 + u32::from(need.is_denoised), 1] } else { [0; 2] };
-        let film = before[0] + samples * (1 + u32::from(need.has_clamp));
+        let film = before[0] + samples * (1 + u32::from(need.has_second));
         Self { samples, before, film }
     }
 
@@ -87,7 +87,7 @@ impl Batch {
         rays.ray_bytes() * u64::from(self.samples)
     }
 
-    /// Memory of the queues of shadow rays for each pixel, bytes.
+    /// Memory of the queues of shadow rays of a depth for each pixel, bytes.
     pub(crate) fn shadow_bytes(self, rays: RayKinds) -> u64 {
         rays.shadow_bytes() * u64::from(rays.sources()) * u64::from(self.samples)
     }
@@ -100,7 +100,8 @@ impl Batch {
 
     /// That of all of them.
     pub(crate) fn bytes(self, rays: RayKinds) -> u64 {
-        self.film_bytes() + self.data_bytes() + 2 * self.ray_bytes(rays) + self.shadow_bytes(rays)
+        let shadows = rays.shadow_arrays() as u64 * self.shadow_bytes(rays);
+        self.film_bytes() + self.data_bytes() + 2 * self.ray_bytes(rays) + shadows
     }
 }
 
@@ -114,7 +115,7 @@ mod tests {
 
     const KINDS: RayKinds =
         RayKinds { has_paths: true, has_mirrors: false, has_layers: false, kept: None, lights: 0 };
-    const NEED: PixelNeed = PixelNeed { samples: 16, is_denoised: true, has_clamp: false };
+    const NEED: PixelNeed = PixelNeed { samples: 16, is_denoised: true, has_second: false };
     const ANY_SIZE: u64 = u64::MAX;
 
     fn samples(rays: RayKinds, need: PixelNeed, pixels: u64, max_array: u64) -> u32 {

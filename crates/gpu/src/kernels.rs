@@ -127,6 +127,8 @@ impl Variant {
         let flags = [
             ("HAS_OPACITY", self.has_opacity),
             ("HAS_CLAMP", self.has_clamp),
+            ("HAS_LIT", !self.has_paths),
+            ("IS_SINGLE", self.is_single),
             ("HAS_DETAIL", self.has_detail),
             ("HAS_MIRRORS", self.has_mirrors),
             ("HAS_OBJECTS", self.has_objects),
@@ -229,13 +231,13 @@ impl Kernels {
             [
                 &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
                 &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
-                &[0, 1, 6, 8, 11, 12, 13, 15, 21],
+                &[0, 1, 6, 8, 12, 13, 15, 21, 29],
             ]
         } else {
             [
                 &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18, 20, 21],
-                &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20],
-                &[0, 1, 6, 8, 11, 12, 13],
+                &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 18, 20, 29],
+                &[0, 1, 6, 8, 12, 13, 29],
             ]
         };
         Self {
@@ -243,7 +245,8 @@ impl Kernels {
             trace_camera: tracing("trace_camera", &[camera, of_glass].concat()),
             trace_next: tracing("trace_next", &[next, of_glass, of_end].concat()),
             trace_shadow: tracing("trace_shadow", &[shadow, of_time].concat()),
-            add_batch: (!variant.is_single).then(|| kernel("add_batch", &[0, 6, 7, 18])),
+            add_batch: (!variant.is_single || !variant.has_paths)
+                .then(|| kernel("add_batch", &[0, 6, 7, 18])),
             clamp_indirect: (variant.has_clamp)
                 .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 21])),
             store_features: (variant.is_denoised)

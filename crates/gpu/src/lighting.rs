@@ -51,6 +51,18 @@ impl RayKinds {
         1 + self.sources() + self.kept.is_some() as u32
     }
 
+    /// Whether shadow rays of one source are traced together with the rays of the next depth: their light is apart from that
+    /// of these rays then. (The queues of paths would need too much memory, and they are so long that the device waits for
+    /// the longest ray of each for a small part of the time.)
+    pub(crate) const fn has_lit(self) -> bool {
+        !self.has_paths
+    }
+
+    /// Number of arrays for shadow rays: some are written while others are traced.
+    pub(crate) const fn shadow_arrays(self) -> usize {
+        if self.has_lit() { 2 } else { 1 }
+    }
+
     /// Memory of a ray that goes on, bytes.
     pub(crate) const fn ray_bytes(self) -> u64 {
         let of_mirrors = if self.has_mirrors { 16 } else { 0 };

@@ -48,7 +48,7 @@ fn pixel_need(rays: RayKinds, settings: &RenderSettings) -> PixelNeed {
     PixelNeed {
         samples: settings.samples,
         is_denoised: settings.has_features,
-        has_clamp: rays.has_paths && settings.clamp.is_some(),
+        has_second: rays.has_lit() || settings.clamp.is_some(),
     }
 }
 

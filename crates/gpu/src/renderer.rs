@@ -287,7 +287,7 @@ impl Renderer {
         let need = PixelNeed {
             samples: picture.samples.count,
             is_denoised: picture.denoising.is_some(),
-            has_clamp: picture.has_clamp(),
+            has_second: picture.ray_kinds().has_lit() || picture.has_clamp(),
         };
         let limits = [self.most_rays, device.adapter().max_array];
         Batch::new(picture.ray_kinds(), need, picture.film.pixels(), limits)
@@ -415,7 +415,9 @@ impl Renderer {
         for queue in &mut arrays.rays {
             queue.reserve(device, "rays", batch.ray_bytes(rays) * pixels)?;
         }
-        arrays.shadows.reserve(device, "shadow rays", batch.shadow_bytes(rays) * pixels)?;
+        for queues in &mut arrays.shadows[..rays.shadow_arrays()] {
+            queues.reserve(device, "shadow rays", batch.shadow_bytes(rays) * pixels)?;
+        }
         arrays.kept.reserve(device, "rays through glass", rays.kept_bytes() * pixels)?;
         if let Model::Paths(lighting) = picture.model {
             arrays.write_tables(device, lighting)?;
@@ -475,7 +477,11 @@ impl Renderer {
         let mut push = |stage: Stage| uniforms.push(&Stage { counters, last, ..stage });
         let mut all = |stages: &mut dyn Iterator<Item = Stage>| stages.map(&mut push).collect();
         let depths = 1..=depth_count;
+        let rays = picture.ray_kinds();
         let sources = 0..picture.sources();
+        let is_used = |depth, source: u32| has_shadows(picture, depth, source);
+        let with_next = sources.clone().find(|source| rays.has_lit() && is_used(1, *source));
+        let source = with_next.unwrap_or_default();
         Plan {
             view,
             scene,
@@ -484,14 +490,22 @@ impl Renderer {
             last: last as usize,
             batch: batch.samples,
             batches,
-            depths: all(&mut depths.clone().map(|depth| Stage { depth, ..Stage::default() })),
+            depths: all(&mut depths.clone().map(|depth| Stage {
+                depth,
+                source,
+                ..Stage::default()
+            })),
             sources: depths
                 .map(|depth| {
-                    let used =
-                        sources.clone().filter(|source| has_shadows(picture, depth, *source));
-                    all(&mut used.map(|source| Stage { depth, source, ..Stage::default() }))
+                    let has_next = |source| depth < depth_count && Some(source) == with_next;
+                    let own = sources
+                        .clone()
+                        .filter(|source| is_used(depth, *source) && !has_next(*source));
+                    all(&mut own.map(|source| Stage { depth, source, ..Stage::default() }))
                 })
                 .collect(),
+            shadow_arrays: rays.shadow_arrays(),
+            has_shadows_with_next: with_next.is_some(),
         }
     }
 
@@ -542,10 +556,13 @@ impl Renderer {
                 let tiles = [plan.film.width.div_ceil(width), plan.film.height.div_ceil(height)];
                 commands.add_groups(&kernels.trace_camera, &array_of, tiles);
             } else {
-                commands.add(&kernels.trace_next, &array_of, rays, GROUP);
+                let of_shadows = if plan.has_shadows_with_next { rays } else { 0 };
+                let invocations = rays.next_multiple_of(GROUP) + of_shadows;
+                commands.add(&kernels.trace_next, &array_of, invocations, GROUP);
             }
             for source in sources {
-                let array_of = |binding| self.array(binding, plan, [batch, *source], number);
+                // They read what this depth has written
+                let array_of = |binding| self.array(binding, plan, [batch, *source], number + 1);
                 commands.add(&kernels.trace_shadow, &array_of, rays, GROUP);
             }
             if let (Some(clamp), 1..) = (&kernels.clamp_indirect, number) {
@@ -581,7 +598,8 @@ impl Renderer {
             8 => &arrays.queued,
             9 => &arrays.rays[depth % 2],
             10 => &arrays.rays[1 - depth % 2],
-            11 => &arrays.shadows,
+            11 => &arrays.shadows[depth % plan.shadow_arrays],
+            29 => &arrays.shadows[(depth + 1) % plan.shadow_arrays],
             12 => &arrays.colors,
             14 => &arrays.sums,
             16 => &arrays.texels,
@@ -659,6 +677,10 @@ struct Plan {
     /// The first sample of each batch.
     batches: Vec<Uniform>,
     depths: Vec<Uniform>,
-    /// The sources of shadow rays of each depth.
+    /// The sources of shadow rays of each depth that have dispatches of their own.
     sources: Vec<Vec<Uniform>>,
+    /// Number of arrays for shadow rays.
+    shadow_arrays: usize,
+    /// Whether those of one source are traced with the rays of the next depth.
+    has_shadows_with_next: bool,
 }

@@ -17,7 +17,7 @@ pub(crate) struct TraceArrays {
     pub(crate) data: Array,
     pub(crate) queued: Array,
     pub(crate) rays: [Array; 2],
-    pub(crate) shadows: Array,
+    pub(crate) shadows: [Array; 2],
     pub(crate) sums: Array,
     pub(crate) texels: Array,
     pub(crate) constants: Array,
@@ -35,8 +35,9 @@ impl TraceArrays {
         Self { colors, ..Self::default() }
     }
 
-    pub(crate) fn all(&self) -> [&Array; 16] {
+    pub(crate) fn all(&self) -> [&Array; 17] {
         let [rays, other_rays] = &self.rays;
+        let [shadows, other_shadows] = &self.shadows;
         [
             &self.colors,
             &self.points,
@@ -46,7 +47,8 @@ impl TraceArrays {
             &self.queued,
             rays,
             other_rays,
-            &self.shadows,
+            shadows,
+            other_shadows,
             &self.sums,
             &self.texels,
             &self.constants,

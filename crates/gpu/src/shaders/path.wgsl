@@ -51,10 +51,10 @@ fn no_shadow() -> Shadow {
 fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
   let place = append(queue_of(stage.depth) + 1u + source, shadow.is_needed) + first_shadow(source);
   if (shadow.is_needed) {
-    shadows[SHADOW * place] = vec4<f32>(shadow.start, word_of(pixel));
-    shadows[SHADOW * place + 1u] = vec4<f32>(shadow.direction, shadow.length);
-    shadows[SHADOW * place + 2u] = vec4<f32>(shadow.radiance, shadow.coverage);
-    if (HAS_LAYERS) { shadows[SHADOW * place + 3u] = shadow.parts; }
+    next_shadows[SHADOW * place] = vec4<f32>(shadow.start, word_of(pixel));
+    next_shadows[SHADOW * place + 1u] = vec4<f32>(shadow.direction, shadow.length);
+    next_shadows[SHADOW * place + 2u] = vec4<f32>(shadow.radiance, shadow.coverage);
+    if (HAS_LAYERS) { next_shadows[SHADOW * place + 3u] = shadow.parts; }
   }
 }
 
@@ -255,9 +255,6 @@ fn add_shadow_parts(pixel: u32, light: vec3<f32>, role: f32, part: f32, parts: v
   add_arrival(pixel, 0.0, -part * parts.w);
 }
 
-// The place in the film of the indirect light that is being traced for a pixel
-fn indirect_place(pixel: u32) -> u32 { return place_in(view.first_film, pixel) + BATCH * view.width * view.height; }
-
 // Adds the light along a ray. A clamp limits what it brings to its first surface, but `direct`; that stays apart until
 // its shadow rays are traced.
 fn add_light(pixel: u32, light: vec4<f32>, direct: vec4<f32>, bounces: u32) {
@@ -266,7 +263,7 @@ fn add_light(pixel: u32, light: vec4<f32>, direct: vec4<f32>, bounces: u32) {
     return;
   }
   add_to_film(pixel, direct);
-  film[indirect_place(pixel)] = light - direct;
+  film[second_place(pixel)] = light - direct;
 }
 
 // Adds what a ray sees without shadows, and appends the rays that leave its intersection.
@@ -493,7 +490,7 @@ fn trace_shadow(
   if (HAS_LAYERS) { add_shadow_parts(pixel, part * light.xyz, light.w, part, shadows[place + 3u]); }
   // What the first surface reflects of a catcher has no limit
   if (HAS_CLAMP && ((adds && is_indirect(light.w)) || (!adds && stage.depth > 2u))) {
-    film[indirect_place(pixel)] += vec4<f32>(part * light.xyz, 0.0);
+    film[second_place(pixel)] += vec4<f32>(part * light.xyz, 0.0);
   } else {
     add_to_film(pixel, vec4<f32>(part * light.xyz, coverage));
   }
@@ -519,7 +516,7 @@ fn clamp_indirect(
   if (i >= atomicLoad(&queued[queue_of(stage.depth - 1u)])) { return; }
   if (bounces_of(stored_state(i)) == 0u) { return; }
   let pixel = pixel_in(rays[RAY * i].w);
-  let light = film[indirect_place(pixel)];
+  let light = film[second_place(pixel)];
   let largest = largest_of(light.xyz);
   // What is not finite stays, so that faults are visible
   var part = 1.0;

@@ -3,13 +3,15 @@
 // A batch has BATCH samples of each pixel, which pass through the kernels together, depth by depth. `trace_camera` and
 // `trace_next` find the intersections of the rays of a depth, add what they show without shadows, and append rays to
 // queues: those that go on to that of the next depth, and shadow rays to one for each source of light. `trace_shadow` adds
-// the light that arrives. The order of a queue changes from run to run, but not the picture: in a dispatch, each sample
-// receives at most one contribution. `add_batch` adds the samples to their pixels, one after the other, so that the size of
+// the light that arrives; by Whitted's model, `trace_next` does for a source of the depth before, so that the device waits
+// for the longest rays of both at once. The order of a queue changes from run to run, but not the picture: in a dispatch,
+// each colour of a sample receives at most one contribution. `add_batch` adds the samples to their pixels, one after the other, so that the size of
 // a batch does not change the picture, either.
 
 // Sums over the samples of each pixel: red, green, blue, coverage; then, for denoising, those over every second sample;
-// then, from `view.first_film` on, each sample of the batch; then, with a clamp, the indirect light of the rays that are
-// being traced. A picture with one sample has its sums there, too.
+// then, from `view.first_film` on, each sample of the batch; then, if samples have a second colour, the indirect light of the
+// rays that are being traced (HAS_CLAMP), or the light of shadow rays (HAS_LIT). A picture with one sample has its sums
+// there, too.
 @group(0) @binding(6) var<storage, read_write> film: array<vec4<f32>>;
 // The nearest sample of each pixel: depth, index of the sphere, normal, position; then, from `view.first_data` on, the
 // samples of the batch
@@ -20,8 +22,10 @@
 // Rays of this depth and of the next one, `RAY` vectors each: origin, pixel with sample, and what the model needs
 @group(0) @binding(9) var<storage, read> rays: array<vec4<f32>>;
 @group(0) @binding(10) var<storage, read_write> next_rays: array<vec4<f32>>;
-// Queues of shadow rays, one behind the other, `SHADOW` vectors each: start, pixel with sample, and what the model needs
-@group(0) @binding(11) var<storage, read_write> shadows: array<vec4<f32>>;
+// Queues of shadow rays, one behind the other, `SHADOW` vectors each: start, pixel with sample, and what the model needs;
+// those that are written, and those that are traced
+@group(0) @binding(11) var<storage, read_write> next_shadows: array<vec4<f32>>;
+@group(0) @binding(29) var<storage, read> shadows: array<vec4<f32>>;
 @group(0) @binding(13) var<uniform> stage: Stage;
 // The same over all samples, in two words each
 @group(0) @binding(14) var<storage, read_write> sums: array<u32>;
@@ -84,6 +88,19 @@ fn place_in(first: u32, pixel: u32) -> u32 { return first + in_batch * view.widt
 // Adds light and coverage to the sample of a pixel.
 fn add_to_film(pixel: u32, sum: vec4<f32>) { film[place_in(view.first_film, pixel)] += sum; }
 
+// The place in the film of the second colour of the sample that is being traced
+fn second_place(pixel: u32) -> u32 { return place_in(view.first_film, pixel) + BATCH * view.width * view.height; }
+
+// The colour of a sample of the batch
+fn color_of(number: u32, pixel: u32) -> vec4<f32> {
+  let count = view.width * view.height;
+  let place = view.first_film + number * count + pixel;
+  var color = film[place];
+  // Only covered samples have shadow rays
+  if (HAS_LIT && color.w > 0.0) { color += vec4<f32>(film[place + BATCH * count].xyz, 0.0); }
+  return color;
+}
+
 // Keeps the first surface of a sample (HAS_OBJECTS): the index of a sphere, `object_of_ground`, or MISS.
 fn keep_object(pixel: u32, object: u32) {
   if (HAS_OBJECTS && stage.depth == 1u) { objects[pixel * view.samples + sample_number()] = object; }
@@ -119,6 +136,10 @@ fn add_batch(
   let pixel = linear_index(group, groups, local, GROUP);
   let count = view.width * view.height;
   if (pixel >= count) { return; }
+  if (IS_SINGLE) {
+    film[pixel] = color_of(0u, pixel);
+    return;
+  }
   // What the batches before have
   var sum = vec4<f32>(0.0);
   var odd = vec4<f32>(0.0);
@@ -130,7 +151,7 @@ fn add_batch(
   }
   var at = MISS;
   for (var number = 0u; number < min(BATCH, view.samples - current.sample); number++) {
-    let value = film[view.first_film + number * count + pixel];
+    let value = color_of(number, pixel);
     sum += value;
     if (((current.sample + number) & 1u) == 1u) { odd += value; }
     let place = 2u * (view.first_data + number * count + pixel);

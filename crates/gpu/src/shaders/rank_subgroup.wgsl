@@ -10,6 +10,20 @@ fn place_of(round: u32, lane: Lane) -> u32 {
   return (lane.group * ROUNDS + round) * lane.size + lane.number;
 }
 
+// Sums of subgroups
+var<workgroup> sums: array<u32, 8>;
+
+// The exclusive sum of `own` over the workgroup.
+fn sum_before(lane: Lane, own: u32) -> u32 {
+  var sum = subgroupExclusiveAdd(own);
+  let all = subgroupAdd(own);
+  if (lane.number == 0u) { sums[lane.group] = all; }
+  workgroupBarrier();
+  for (var k = 0u; k < lane.group; k++) { sum += sums[k]; }
+  workgroupBarrier();
+  return sum;
+}
+
 // The invocations of the subgroup with a pair of the same digit, as a mask
 fn peers_of(is_valid: bool, d: u32) -> vec2<u32> {
   var peers = subgroupBallot(is_valid).xy;
@@ -28,7 +42,7 @@ fn count_bits(mask: vec2<u32>) -> u32 {
 
 // Ranks the pairs of each invocation. Returns how many have the digit whose number is that of the invocation.
 fn rank_pairs(valid: u32, lane: Lane) -> u32 {
-  let local = lane.group * lane.size + lane.number;
+  let local = local_of(lane);
   for (var k = 0u; k < 8u; k++) { atomicStore(&tallies[k * DIGITS + local], 0u); }
   workgroupBarrier();
   // Among the pairs of the subgroup: the first peer counts for all

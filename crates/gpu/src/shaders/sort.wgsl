@@ -82,27 +82,15 @@ var<workgroup> ordered_pairs: array<vec2<u32>, TILE>;
 // An invocation: its group of `size` neighbours, and its number in this group
 struct Lane { group: u32, number: u32, size: u32 }
 
+fn local_of(lane: Lane) -> u32 { return lane.group * lane.size + lane.number; }
+
 // The pairs of an invocation, and how many of the same digit are before each in the tile
 var<private> pairs: array<vec2<u32>, ROUNDS>;
 var<private> ranks: array<u32, ROUNDS>;
 
-// The exclusive sum of `own` over the workgroup, through `starts`.
-fn scan_group(local: u32, own: u32) -> u32 {
-  starts[local] = own;
-  for (var step = 1u; step < DIGITS; step <<= 1u) {
-    workgroupBarrier();
-    var other = 0u;
-    if (local >= step) { other = starts[local - step]; }
-    workgroupBarrier();
-    starts[local] += other;
-  }
-  workgroupBarrier();
-  return starts[local] - own;
-}
-
 fn scatter_tile(tile: u32, lane: Lane) {
   if (tile >= build.tiles) { return; }
-  let local = lane.group * lane.size + lane.number;
+  let local = local_of(lane);
   // Read the tile, and find where its pairs with digit `local` go
   let first = tile * TILE;
   let valid = min(TILE, build.count - first);
@@ -110,9 +98,9 @@ fn scatter_tile(tile: u32, lane: Lane) {
     let i = place_of(round, lane);
     if (i < valid) { pairs[round] = pairs_in[first + i]; }
   }
-  let output_start = scan_group(local, totals[local]) + counts[local * build.tiles + tile];
+  let output_start = sum_before(lane, totals[local]) + counts[local * build.tiles + tile];
   // Order the tile, so that neighbours write to neighbours
-  let tile_start = scan_group(local, rank_pairs(valid, lane));
+  let tile_start = sum_before(lane, rank_pairs(valid, lane));
   base[local] = output_start - tile_start;
   starts[local] = tile_start;
   workgroupBarrier();

@@ -84,6 +84,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
     surface = surface_at(ray, hit);
     if (stage.depth == 1u) {
       sum.w = 1.0;
+      film[second_place(pixel)] = vec4<f32>(0.0);
       keep_surface(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, pixel);
     }
     throughput = absorbed(path, ray, hit, surface);
@@ -120,8 +121,8 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
     }
     let place = append(queue + 1u + number, is_lit) + first_shadow(number);
     if (is_lit) {
-      shadows[SHADOW * place] = vec4<f32>(surface.start, word_of(pixel));
-      shadows[SHADOW * place + 1u] = vec4<f32>(radiance, 0.0);
+      next_shadows[SHADOW * place] = vec4<f32>(surface.start, word_of(pixel));
+      next_shadows[SHADOW * place + 1u] = vec4<f32>(radiance, 0.0);
     }
   }
   if (is_ray) {
@@ -152,7 +153,20 @@ fn trace_camera(
   follow(is_ray, ray, path, hit);
 }
 
-// The rays that were reflected at the depth before.
+// Adds the light of a source that arrives at the surfaces of a depth, as far as the shadow ray with this number shows it.
+fn follow_shadow(i: u32, depth: u32) {
+  if (i >= atomicLoad(&queued[queue_of(depth) + 1u + stage.source])) { return; }
+  let place = SHADOW * (i + first_shadow(stage.source));
+  let start = shadows[place];
+  let into = toward(view.lights[stage.source], start.xyz);
+  let pixel = pixel_in(start.w);
+  let passing = transmittance(Ray(start.xyz, into.xyz, time_of(pixel)), into.w, true);
+  if (passing > 0.0) {
+    film[second_place(pixel)] += vec4<f32>(passing * shadows[place + 1u].xyz, 0.0);
+  }
+}
+
+// The rays that were reflected at the depth before, then the shadow rays of a source from there, in workgroups of their own.
 @compute @workgroup_size(GROUP)
 fn trace_next(
   @builtin(workgroup_id) group: vec3<u32>,
@@ -160,7 +174,13 @@ fn trace_next(
   @builtin(local_invocation_index) local: u32,
 ) {
   let i = linear_index(group, groups, local, GROUP);
-  let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
+  let count = atomicLoad(&queued[queue_of(stage.depth - 1u)]);
+  let first_of_shadows = (count + GROUP - 1u) / GROUP * GROUP;
+  if (i >= first_of_shadows) {
+    if (view.light_count > 0u) { follow_shadow(i - first_of_shadows, stage.depth - 1u); }
+    return;
+  }
+  let is_ray = i < count;
   var ray: Ray;
   var path = camera_path(0u, vec2<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
@@ -172,21 +192,12 @@ fn trace_next(
   follow(is_ray, ray, path, hit);
 }
 
-// Adds the light of a source that arrives at the surfaces of a depth.
+// The shadow rays of a source from a depth.
 @compute @workgroup_size(GROUP)
 fn trace_shadow(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local, GROUP);
-  if (i >= atomicLoad(&queued[queue_of(stage.depth) + 1u + stage.source])) { return; }
-  let place = i + first_shadow(stage.source);
-  let start = shadows[SHADOW * place];
-  let into = toward(view.lights[stage.source], start.xyz);
-  let pixel = pixel_in(start.w);
-  let passing = transmittance(Ray(start.xyz, into.xyz, time_of(pixel)), into.w, true);
-  if (passing > 0.0) {
-    add_to_film(pixel, vec4<f32>(passing * shadows[SHADOW * place + 1u].xyz, 0.0));
-  }
+  follow_shadow(linear_index(group, groups, local, GROUP), stage.depth);
 }
