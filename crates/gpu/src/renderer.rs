@@ -505,7 +505,6 @@ impl Renderer {
                 })
                 .collect(),
             shadow_arrays: rays.shadow_arrays(),
-            has_shadows_with_next: with_next.is_some(),
         }
     }
 
@@ -556,9 +555,7 @@ impl Renderer {
                 let tiles = [plan.film.width.div_ceil(width), plan.film.height.div_ceil(height)];
                 commands.add_groups(&kernels.trace_camera, &array_of, tiles);
             } else {
-                let of_shadows = if plan.has_shadows_with_next { rays } else { 0 };
-                let invocations = rays.next_multiple_of(GROUP) + of_shadows;
-                commands.add(&kernels.trace_next, &array_of, invocations, GROUP);
+                commands.add(&kernels.trace_next, &array_of, rays, GROUP);
             }
             for source in sources {
                 // They read what this depth has written
@@ -681,6 +678,4 @@ struct Plan {
     sources: Vec<Vec<Uniform>>,
     /// Number of arrays for shadow rays.
     shadow_arrays: usize,
-    /// Whether those of one source are traced with the rays of the next depth.
-    has_shadows_with_next: bool,
 }

@@ -137,7 +137,8 @@ fn add_batch(
   let count = view.width * view.height;
   if (pixel >= count) { return; }
   if (IS_SINGLE) {
-    film[pixel] = color_of(0u, pixel);
+    let color = color_of(0u, pixel);
+    if (color.w > 0.0) { film[pixel] = color; }
     return;
   }
   // What the batches before have
