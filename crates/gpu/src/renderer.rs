@@ -547,6 +547,7 @@ impl Renderer {
         first: usize,
     ) {
         let rays = plan.film.pixels() * u64::from(plan.batch);
+        let followers = rays.div_ceil(2);
         let depths = plan.depths.iter().zip(&plan.sources).enumerate();
         for (number, (depth, sources)) in depths.skip(first) {
             let array_of = |binding| self.array(binding, plan, [batch, *depth], number);
@@ -555,12 +556,12 @@ impl Renderer {
                 let tiles = [plan.film.width.div_ceil(width), plan.film.height.div_ceil(height)];
                 commands.add_groups(&kernels.trace_camera, &array_of, tiles);
             } else {
-                commands.add(&kernels.trace_next, &array_of, rays, GROUP);
+                commands.add(&kernels.trace_next, &array_of, followers, GROUP);
             }
             for source in sources {
                 // They read what this depth has written
                 let array_of = |binding| self.array(binding, plan, [batch, *source], number + 1);
-                commands.add(&kernels.trace_shadow, &array_of, rays, GROUP);
+                commands.add(&kernels.trace_shadow, &array_of, followers, GROUP);
             }
             if let (Some(clamp), 1..) = (&kernels.clamp_indirect, number) {
                 commands.add(clamp, &array_of, rays, GROUP);

@@ -437,15 +437,8 @@ fn trace_camera(
   follow(is_ray, ray, path, ground, hit);
 }
 
-// The rays that go on from the depth before.
-@compute @workgroup_size(GROUP)
-fn trace_next(
-  @builtin(workgroup_id) group: vec3<u32>,
-  @builtin(num_workgroups) groups: vec3<u32>,
-  @builtin(local_invocation_index) local: u32,
-) {
-  let i = linear_index(group, groups, local, GROUP);
-  let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
+// A ray that goes on from the depth before.
+fn follow_next(i: u32, is_ray: bool) {
   var path = camera_path(0u, vec2<f32>(0.0));
   var ray: Ray;
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
@@ -464,15 +457,21 @@ fn trace_next(
   follow(is_ray, ray, path, ground, hit);
 }
 
-// Adds the light of a source that arrives at the surfaces of a depth, or takes away that which does not arrive.
+// The rays that go on from the depth before.
 @compute @workgroup_size(GROUP)
-fn trace_shadow(
+fn trace_next(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local, GROUP);
-  if (i >= atomicLoad(&queued[queue_of(stage.depth) + 1u + stage.source])) { return; }
+  let count = count_next(stage.depth - 1u);
+  for (var i = linear_index(group, groups, local, GROUP); i < padded(count); i += size_of(groups)) {
+    follow_next(i, i < count);
+  }
+}
+
+// Adds the light that arrives along a shadow ray, or takes away that which does not arrive.
+fn follow_shadow(i: u32) {
   let place = SHADOW * (i + first_shadow(stage.source));
   let start = shadows[place];
   let into = shadows[place + 1u];

@@ -126,6 +126,32 @@ fn keep_surface(depth: f32, index: u32, normal: vec3<f32>, point: vec3<f32>, pix
   data[place + 1u] = vec4<u32>(bitcast<u32>(normal.z), bitcast<vec3<u32>>(point));
 }
 
+// Kernels that follow a queue have half as many invocations as it has rays at most, so that fewer end without a ray; some
+// have two rays, one after the other.
+
+// The rays that go on from a depth
+fn count_next(depth: u32) -> u32 { return atomicLoad(&queued[queue_of(depth)]); }
+
+// The shadow rays of the source from a depth
+fn count_shadows(depth: u32) -> u32 { return atomicLoad(&queued[queue_of(depth) + 1u + stage.source]); }
+
+// A number of rays, rounded up to whole workgroups
+fn padded(count: u32) -> u32 { return (count + GROUP - 1u) / GROUP * GROUP; }
+
+// The number of all invocations
+fn size_of(groups: vec3<u32>) -> u32 { return groups.x * groups.y * GROUP; }
+
+// The shadow rays of a source from a depth.
+@compute @workgroup_size(GROUP)
+fn trace_shadow(
+  @builtin(workgroup_id) group: vec3<u32>,
+  @builtin(num_workgroups) groups: vec3<u32>,
+  @builtin(local_invocation_index) local: u32,
+) {
+  let count = count_shadows(stage.depth);
+  for (var i = linear_index(group, groups, local, GROUP); i < count; i += size_of(groups)) { follow_shadow(i); }
+}
+
 // Adds the samples of a batch to their pixels, and keeps the nearest surface of each, the first of equals.
 @compute @workgroup_size(GROUP)
 fn add_batch(

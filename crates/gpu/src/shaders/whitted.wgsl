@@ -153,12 +153,6 @@ fn trace_camera(
   follow(is_ray, ray, path, hit);
 }
 
-// The number of shadow rays of the source from a depth
-fn count_shadows(depth: u32) -> u32 {
-  if (view.light_count == 0u) { return 0u; }
-  return atomicLoad(&queued[queue_of(depth) + 1u + stage.source]);
-}
-
 // Adds the light that arrives along a shadow ray.
 fn follow_shadow(i: u32) {
   let place = SHADOW * (i + first_shadow(stage.source));
@@ -171,42 +165,35 @@ fn follow_shadow(i: u32) {
   }
 }
 
+// A ray that was reflected at the depth before.
+fn follow_next(i: u32, is_ray: bool) {
+  var ray: Ray;
+  var path = camera_path(0u, vec2<f32>(0.0));
+  var hit = Hit(0.0, MISS, MISS);
+  if (is_ray) {
+    path = stored_path(i);
+    ray = Ray(rays[RAY * i].xyz, rays[RAY * i + 1u].xyz, time_of(path.pixel));
+    hit = nearest(ray, FAR, number_of_end(path.pixel, REFLECTED));
+  }
+  follow(is_ray, ray, path, hit);
+}
+
 // The rays that were reflected at the depth before, then the shadow rays of a source from there, in workgroups of their own.
-// There are as many invocations as rays at most: some have one of each. (More would end without a ray, mostly.)
 @compute @workgroup_size(GROUP)
 fn trace_next(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let count = atomicLoad(&queued[queue_of(stage.depth - 1u)]);
-  let first_of_shadows = (count + GROUP - 1u) / GROUP * GROUP;
-  let end = first_of_shadows + count_shadows(stage.depth - 1u);
-  for (var i = linear_index(group, groups, local, GROUP); i < end; i += groups.x * groups.y * GROUP) {
+  let count = count_next(stage.depth - 1u);
+  let first_of_shadows = padded(count);
+  var end = first_of_shadows;
+  if (view.light_count > 0u) { end += count_shadows(stage.depth - 1u); }
+  for (var i = linear_index(group, groups, local, GROUP); i < end; i += size_of(groups)) {
     if (i >= first_of_shadows) {
       follow_shadow(i - first_of_shadows);
-      continue;
+    } else {
+      follow_next(i, i < count);
     }
-    let is_ray = i < count;
-    var ray: Ray;
-    var path = camera_path(0u, vec2<f32>(0.0));
-    var hit = Hit(0.0, MISS, MISS);
-    if (is_ray) {
-      path = stored_path(i);
-      ray = Ray(rays[RAY * i].xyz, rays[RAY * i + 1u].xyz, time_of(path.pixel));
-      hit = nearest(ray, FAR, number_of_end(path.pixel, REFLECTED));
-    }
-    follow(is_ray, ray, path, hit);
   }
-}
-
-// The shadow rays of a source from a depth.
-@compute @workgroup_size(GROUP)
-fn trace_shadow(
-  @builtin(workgroup_id) group: vec3<u32>,
-  @builtin(num_workgroups) groups: vec3<u32>,
-  @builtin(local_invocation_index) local: u32,
-) {
-  let i = linear_index(group, groups, local, GROUP);
-  if (i < count_shadows(stage.depth)) { follow_shadow(i); }
 }
