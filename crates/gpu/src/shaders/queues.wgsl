@@ -5,8 +5,8 @@
 // queues: those that go on to that of the next depth, and shadow rays to one for each source of light. `trace_shadow` adds
 // the light that arrives; by Whitted's model, `trace_next` does for a source of the depth before, so that the device waits
 // for the longest rays of both at once. The order of a queue changes from run to run, but not the picture: in a dispatch,
-// each colour of a sample receives at most one contribution. `add_batch` adds the samples to their pixels, one after the other, so that the size of
-// a batch does not change the picture, either.
+// each colour of a sample receives at most one contribution. `add_batch` adds the samples to their pixels, one after the
+// other, so that the size of a batch does not change the picture, either.
 
 // Sums over the samples of each pixel: red, green, blue, coverage; then, for denoising, those over every second sample;
 // then, from `view.first_film` on, each sample of the batch; then, if samples have a second colour, the indirect light of the
@@ -37,8 +37,8 @@
 // Invocations of a workgroup that follows a queue
 const GROUP: u32 = 64u;
 
-// What differs between the dispatches of a sample. `depth` counts from 1; with glass, paths may be at other depths. `last` is the queue of the last depth if rays go
-// on behind it, or 0.
+// What differs between the dispatches of a sample. `depth` counts from 1; with glass, paths may be at other depths. `last`
+// is the queue of the last depth if rays go on behind it, or 0.
 struct Stage { depth: u32, source: u32, counters: u32, last: u32 }
 
 // What differs between batches: the number of the first sample

@@ -1,6 +1,5 @@
-// Ranks the pairs of a tile with ballots, on devices whose subgroups have 32 to 64 invocations. Each subgroup has a run of
-// the tile, so that it needs no barriers before all subgroups are done (Merrill and Garland, "Single-pass parallel prefix
-// scan with decoupled look-back", 2016, rank the pairs of a warp in this way).
+// Ranks the pairs of a tile with ballots, on devices whose subgroups have 32 to 64 invocations (Ashkiani et al., "GPU
+// Multisplit", 2016). Each subgroup has a run of the tile, so that it needs no barriers before all subgroups are done.
 
 // By subgroup and digit: the number of pairs, then that in the subgroups before
 var<workgroup> tallies: array<atomic<u32>, 2048>;
