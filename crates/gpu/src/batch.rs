@@ -23,8 +23,8 @@ pub(crate) struct PixelNeed {
     pub(crate) samples: u32,
     /// Whether the film has the sums over every second sample.
     pub(crate) is_denoised: bool,
-    /// Whether samples have a second colour.
-    pub(crate) has_second: bool,
+    /// Whether indirect light has a limit.
+    pub(crate) has_clamp: bool,
 }
 
 /// How many planes of pixels the arrays have.
@@ -50,7 +50,7 @@ impl Batch {
         pixels: u64,
         [most_rays, max_array]: [u64; 2],
     ) -> Self {
-        let of = |samples| Self::with(need, samples);
+        let of = |samples| Self::with(rays, need, samples);
         let fits = |samples: u32| {
             let batch = of(samples);
             let bytes = batch.largest_bytes(rays);
@@ -66,9 +66,11 @@ impl Batch {
     }
 
     /// A batch of so many samples of each pixel.
-    pub(crate) fn with(need: PixelNeed, samples: u32) -> Self {
+    pub(crate) fn with(rays: RayKinds, need: PixelNeed, samples: u32) -> Self {
         let before = if need.samples > 1 { [1 + u32::from(need.is_denoised), 1] } else { [0; 2] };
-        let film = before[0] + samples * (1 + u32::from(need.has_second));
+        // Samples have a second colour where light is apart for a while
+        let colors = 1 + u32::from(rays.has_lit() || need.has_clamp);
+        let film = before[0] + samples * colors;
         Self { samples, before, film }
     }
 
@@ -115,7 +117,7 @@ mod tests {
 
     const KINDS: RayKinds =
         RayKinds { has_paths: true, has_mirrors: false, has_layers: false, kept: None, lights: 0 };
-    const NEED: PixelNeed = PixelNeed { samples: 16, is_denoised: true, has_second: false };
+    const NEED: PixelNeed = PixelNeed { samples: 16, is_denoised: true, has_clamp: false };
     const ANY_SIZE: u64 = u64::MAX;
 
     fn samples(rays: RayKinds, need: PixelNeed, pixels: u64, max_array: u64) -> u32 {

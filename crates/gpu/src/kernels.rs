@@ -42,6 +42,8 @@ pub(crate) struct Kernels {
 pub(crate) struct Variant {
     /// Whether paths are traced.
     has_paths: bool,
+    /// Whether the light of shadow rays is apart from that of other rays.
+    has_lit: bool,
     /// Whether the colours of spheres have an opacity each.
     colors_have_opacity: bool,
     /// Whether it matters: transmissive spheres have an inside.
@@ -104,6 +106,7 @@ impl Variant {
         Self {
             colors_have_opacity: has_opacity,
             has_paths: picture.has_paths(),
+            has_lit: picture.ray_kinds().has_lit(),
             has_opacity: has_opacity && !has_glass,
             has_clamp: picture.has_clamp(),
             has_detail: picture.detail().is_some(),
@@ -127,7 +130,7 @@ impl Variant {
         let flags = [
             ("HAS_OPACITY", self.has_opacity),
             ("HAS_CLAMP", self.has_clamp),
-            ("HAS_LIT", !self.has_paths),
+            ("HAS_LIT", self.has_lit),
             ("IS_SINGLE", self.is_single),
             ("HAS_DETAIL", self.has_detail),
             ("HAS_MIRRORS", self.has_mirrors),
@@ -245,7 +248,7 @@ impl Kernels {
             trace_camera: tracing("trace_camera", &[camera, of_glass].concat()),
             trace_next: tracing("trace_next", &[next, of_glass, of_end].concat()),
             trace_shadow: tracing("trace_shadow", &[shadow, of_time].concat()),
-            add_batch: (!variant.is_single || !variant.has_paths)
+            add_batch: (!variant.is_single || variant.has_lit)
                 .then(|| kernel("add_batch", &[0, 6, 7, 18])),
             clamp_indirect: (variant.has_clamp)
                 .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 21])),

@@ -48,7 +48,7 @@ fn pixel_need(rays: RayKinds, settings: &RenderSettings) -> PixelNeed {
     PixelNeed {
         samples: settings.samples,
         is_denoised: settings.has_features,
-        has_second: rays.has_lit() || settings.clamp.is_some(),
+        has_clamp: rays.has_paths && settings.clamp.is_some(),
     }
 }
 
@@ -57,7 +57,7 @@ pub fn largest_array(scene: &Scene, settings: &RenderSettings) -> u64 {
     let (rays, [objects, layers]) = needs_of(scene, settings);
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let denoiser = if settings.has_features { denoise::LARGEST_PER_PIXEL } else { 0 };
-    let single = Batch::with(pixel_need(rays, settings), 1).largest_bytes(rays);
+    let single = Batch::with(rays, pixel_need(rays, settings), 1).largest_bytes(rays);
     let arrays = [single, rays.kept_bytes(), objects, layers, denoiser];
     arrays.into_iter().max().unwrap_or_default() * pixels
 }

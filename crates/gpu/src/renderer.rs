@@ -287,7 +287,7 @@ impl Renderer {
         let need = PixelNeed {
             samples: picture.samples.count,
             is_denoised: picture.denoising.is_some(),
-            has_second: picture.ray_kinds().has_lit() || picture.has_clamp(),
+            has_clamp: picture.has_clamp(),
         };
         let limits = [self.most_rays, device.adapter().max_array];
         Batch::new(picture.ray_kinds(), need, picture.film.pixels(), limits)

@@ -23,18 +23,13 @@ fn write_box(i: u32, low: vec3<f32>, high: vec3<f32>) {
 // Boxes of the children, and their planes on the grid of the node
 var<workgroup> lows: array<vec3<f32>, 64>;
 var<workgroup> highs: array<vec3<f32>, 64>;
-var<workgroup> lower: array<vec3<u32>, 64>;
-var<workgroup> upper: array<vec3<u32>, 64>;
+// Lower planes, then upper ones
+var<workgroup> planes: array<vec3<u32>, 128>;
 
-// The bytes of four numbers from `first` on, on an axis.
-fn lower_word(first: u32, axis: u32) -> u32 {
-  return lower[first][axis] | (lower[first + 1u][axis] << 8u) | (lower[first + 2u][axis] << 16u)
-    | (lower[first + 3u][axis] << 24u);
-}
-
-fn upper_word(first: u32, axis: u32) -> u32 {
-  return upper[first][axis] | (upper[first + 1u][axis] << 8u) | (upper[first + 2u][axis] << 16u)
-    | (upper[first + 3u][axis] << 24u);
+// The bytes of four planes from `first` on, on an axis.
+fn word_of_planes(first: u32, axis: u32) -> u32 {
+  return planes[first][axis] | (planes[first + 1u][axis] << 8u) | (planes[first + 2u][axis] << 16u)
+    | (planes[first + 3u][axis] << 24u);
 }
 
 // The nodes of a level, and their boxes: one invocation for each child.
@@ -69,8 +64,8 @@ fn build_level(
   let exponents = clamp(
     (bitcast<vec3<u32>>((high - low) / 254.0) >> vec3<u32>(23u)) + vec3<u32>(1u), vec3<u32>(1u), vec3<u32>(254u));
   let steps = 1.0 / bitcast<vec3<f32>>(exponents << vec3<u32>(23u));
-  lower[local] = vec3<u32>(clamp(floor((own_low - low) * steps), vec3<f32>(0.0), vec3<f32>(255.0)));
-  upper[local] = vec3<u32>(clamp(ceil((own_high - low) * steps), vec3<f32>(0.0), vec3<f32>(255.0)));
+  planes[local] = vec3<u32>(clamp(floor((own_low - low) * steps), vec3<f32>(0.0), vec3<f32>(255.0)));
+  planes[64u + local] = vec3<u32>(clamp(ceil((own_high - low) * steps), vec3<f32>(0.0), vec3<f32>(255.0)));
   workgroupBarrier();
   // Four invocations write one vector each
   let i = child >> 3u;
@@ -85,5 +80,6 @@ fn build_level(
   }
   let axis = part - 1u;
   nodes[at + part] = vec4<u32>(
-    lower_word(first, axis), lower_word(first + 4u, axis), upper_word(first, axis), upper_word(first + 4u, axis));
+    word_of_planes(first, axis), word_of_planes(first + 4u, axis),
+    word_of_planes(first + 64u, axis), word_of_planes(first + 68u, axis));
 }

@@ -512,7 +512,7 @@ fn clamp_indirect(
   @builtin(local_invocation_index) local: u32,
 ) {
   let i = linear_index(group, groups, local, GROUP);
-  if (i >= atomicLoad(&queued[queue_of(stage.depth - 1u)])) { return; }
+  if (i >= count_next(stage.depth - 1u)) { return; }
   if (bounces_of(stored_state(i)) == 0u) { return; }
   let pixel = pixel_in(rays[RAY * i].w);
   let light = film[second_place(pixel)];
