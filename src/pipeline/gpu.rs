@@ -136,8 +136,6 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     let of_scene = missing(&picture.scene, &picture.render);
     [
         of_scene.map(|missing| (key_of(missing), missing.to_string())),
-        (picture.view.lens.is_some() && picture.render.integrator == IntegratorKind::Whitted)
-            .then(|| ("camera.f_stop", Missing::Lens.to_string())),
         (picture.surface.kind != SurfaceKind::Spheres)
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
         rules.first().bonds.is_some().then(|| ("bonds", "bonds".to_owned())),
@@ -255,7 +253,6 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Photons => "render.caustics",
         Missing::StylesInGlass => "style",
         Missing::Ground => "render.ground",
-        Missing::Lens => "camera.f_stop",
         Missing::Stereo => "camera.stereo",
         Missing::Panorama => "camera.projection",
         Missing::LightExtent | Missing::Lights => "light",

@@ -111,6 +111,16 @@ mod on_a_device {
         assert_equal(&workshop, ["gpu", "cpu"]);
     }
 
+    #[test]
+    fn a_ground_by_whitted_is_that_of_the_cpu() {
+        let Some(workshop) = workshop_with_device() else { return };
+        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
+            let picture = ["--integrator=whitted", "--look=none", "--ground=checker"];
+            workshop.render_to(out, &[&picture[..], device].concat()).expect(0);
+        }
+        assert_equal(&workshop, ["gpu", "cpu"]);
+    }
+
     /// The part of the light that `render.clamp` takes away.
     #[test]
     fn limited_light_is_reported() {
@@ -245,7 +255,10 @@ mod on_a_device {
                 &["--ground=plain", "--set=render.ground_pattern=\"sand\""][..],
                 "render.ground: a ground",
             ),
-            (&[whitted, "--ground=checker"], "render.ground: a ground"),
+            (
+                &[whitted, "--ground=checker", "--set=material.type=\"glass\""],
+                "render.ground: a ground",
+            ),
             (
                 &["--ground=plain", "--set=material.type=\"glass\""],
                 "render.caustics: caustics of transmissive particles",

@@ -42,6 +42,8 @@ pub(crate) struct Kernels {
 pub(crate) struct Variant {
     /// Whether paths are traced.
     has_paths: bool,
+    /// Whether there is the uniform of paths, or of a ground.
+    has_scene: bool,
     /// Whether the light of shadow rays is apart from that of other rays.
     has_lit: bool,
     /// Whether the colours of spheres have an opacity each.
@@ -90,7 +92,13 @@ const SMOOTH_GLASS: [&str; 2] =
     [include_str!("shaders/glass.wgsl"), include_str!("shaders/smooth_glass.wgsl")];
 const ROUGH_GLASS: [&str; 2] =
     [include_str!("shaders/glass.wgsl"), include_str!("shaders/rough_glass.wgsl")];
-const WHITTED: [&str; 1] = [include_str!("shaders/whitted.wgsl")];
+const WHITTED: [&str; 2] =
+    [include_str!("shaders/no_ground.wgsl"), include_str!("shaders/whitted.wgsl")];
+const WHITTED_ON_GROUND: [&str; 3] = [
+    include_str!("shaders/scene.wgsl"),
+    include_str!("shaders/ground.wgsl"),
+    include_str!("shaders/whitted.wgsl"),
+];
 
 impl Variant {
     /// What a picture of a tree needs.
@@ -106,6 +114,7 @@ impl Variant {
         Self {
             colors_have_opacity: has_opacity,
             has_paths: picture.has_paths(),
+            has_scene: picture.has_paths() || picture.whitted_ground().is_some(),
             has_lit: picture.ray_kinds().has_lit(),
             has_opacity: has_opacity && !has_glass,
             has_clamp: picture.has_clamp(),
@@ -171,7 +180,13 @@ impl Variant {
         } else {
             &[include_str!("shaders/opaque.wgsl")]
         };
-        let model = if self.has_paths { &PATHS[..] } else { &WHITTED };
+        let model: &[&str] = if self.has_paths {
+            &PATHS
+        } else if self.has_scene {
+            &WHITTED_ON_GROUND
+        } else {
+            &WHITTED
+        };
         let spheres = match self.kept_encoding {
             None => include_str!("shaders/decoded_spheres.wgsl").to_owned(),
             Some(encoding) => [
@@ -227,14 +242,15 @@ impl Kernels {
         // Rays that glass ends see the background, which is a part of the light
         let of_glass: &[u32] = if variant.has_glass { &[23] } else { &[] };
         let of_end: &[u32] = if variant.has_glass && !variant.has_paths { &[21] } else { &[] };
-        let of_ground: &[u32] = if variant.has_paths { &[15] } else { &[] };
-        let tracing =
-            |entry, bindings: &[u32]| kernel(entry, &[bindings, of_spheres, of_motion].concat());
+        let of_scene: &[u32] = if variant.has_scene { &[15] } else { &[] };
+        let tracing = |entry, bindings: &[u32]| {
+            kernel(entry, &[bindings, of_spheres, of_motion, of_scene].concat())
+        };
         let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
             [
-                &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
-                &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19, 20, 21],
-                &[0, 1, 6, 8, 12, 13, 15, 21, 29],
+                &[0, 1, 4, 5, 6, 7, 8, 10, 11, 12, 13, 16, 17, 18, 19, 20, 21],
+                &[0, 1, 6, 7, 8, 9, 10, 11, 12, 13, 16, 17, 18, 19, 20, 21],
+                &[0, 1, 6, 8, 12, 13, 21, 29],
             ]
         } else {
             [
@@ -253,7 +269,7 @@ impl Kernels {
             clamp_indirect: (variant.has_clamp)
                 .then(|| kernel("clamp_indirect", &[0, 6, 8, 9, 13, 15, 21])),
             store_features: (variant.is_denoised)
-                .then(|| kernel("store_features", &[&[0, 7, 12, 28], of_ground].concat())),
+                .then(|| kernel("store_features", &[&[0, 7, 12, 28], of_scene].concat())),
         }
     }
 }

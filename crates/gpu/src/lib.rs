@@ -50,7 +50,7 @@
 //!     denoising: None,
 //!     has_objects: false,
 //!     light_groups: None,
-//!     model: Model::Whitted,
+//!     model: Model::Whitted(None),
 //!     max_depth: 1,
 //!     background: Background::Constant([0.0; 3]),
 //!     is_transparent: false,
@@ -115,7 +115,7 @@ pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
 pub use lighting::{
     Catcher, Detail, Environment, Finish, Ground, Lighting, MAX_FINISHES, Model, Rough, TablePlace,
-    Tables,
+    Tables, WhittedGround,
 };
 pub use memory::{bytes_per_pixel, host_bytes_per_pixel, largest_array};
 pub use picture::{

@@ -11,8 +11,8 @@ pub const MAX_FINISHES: usize = 65;
 /// How light is transported.
 #[derive(Debug, Clone, Copy)]
 pub enum Model<'a> {
-    /// Whitted's model: ambient light, lights without extent, mirrored rays.
-    Whitted,
+    /// Whitted's model: ambient light, lights without extent, mirrored rays; and a ground, if there is one.
+    Whitted(Option<WhittedGround>),
     /// Path tracing.
     Paths(&'a Lighting),
 }
@@ -195,6 +195,17 @@ pub struct Catcher {
     pub table: TablePlace,
 }
 
+/// A ground in Whitted's model.
+#[derive(Debug, Clone, Copy)]
+pub struct WhittedGround {
+    /// The plane.
+    pub plane: Ground,
+    /// `Ka` times the ambient light.
+    pub ambient: [f32; 3],
+    /// `Kd`.
+    pub diffuse: f32,
+}
+
 /// Reflection of light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Finish {
@@ -237,6 +248,8 @@ pub(crate) struct SceneUniform {
     ground_kind: u32,
     ground_across: [f32; 3],
     ground_tile: f32,
+    ground_ambient: [f32; 3],
+    ground_diffuse: f32,
     environment: [u32; 4],
     catcher: [u32; 4],
     image: u32,
@@ -314,6 +327,18 @@ impl From<&Lighting> for SceneUniform {
         if let Some(ground) = &lighting.ground {
             uniform.set_ground(ground);
         }
+        uniform
+    }
+}
+
+impl From<&WhittedGround> for SceneUniform {
+    fn from(ground: &WhittedGround) -> Self {
+        let mut uniform = Self {
+            ground_ambient: ground.ambient,
+            ground_diffuse: ground.diffuse,
+            ..Self::zeroed()
+        };
+        uniform.set_ground(&ground.plane);
         uniform
     }
 }

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use spherule_tracer::denoise::DenoiseSettings;
 use spherule_tracer::render::PathSeed;
 
-use crate::lighting::{Detail, Lighting, Model, RayKinds};
+use crate::lighting::{Detail, Lighting, Model, RayKinds, WhittedGround};
 
 /// Largest number of lights.
 pub const MAX_LIGHTS: usize = 8;
@@ -66,7 +66,7 @@ impl<'a> Picture<'a> {
             denoising: None,
             has_objects: false,
             light_groups: None,
-            model: Model::Whitted,
+            model: Model::Whitted(None),
             max_depth: 1,
             background: Background::Constant([0.0; 3]),
             is_transparent: false,
@@ -92,6 +92,14 @@ impl Picture<'_> {
     /// Whether paths are traced.
     pub(crate) const fn has_paths(&self) -> bool {
         matches!(self.model, Model::Paths(_))
+    }
+
+    /// The ground of Whitted's model.
+    pub(crate) const fn whitted_ground(&self) -> Option<&WhittedGround> {
+        match &self.model {
+            Model::Whitted(ground) => ground.as_ref(),
+            Model::Paths(_) => None,
+        }
     }
 
     /// The image of the environment at its own resolution.
@@ -165,7 +173,7 @@ pub struct Camera {
     pub size: [f32; 2],
     /// Whether all rays are parallel.
     pub is_parallel: bool,
-    /// Radius of the lens, and distance of the plane in focus; path tracing only.
+    /// Radius of the lens, and distance of the plane in focus.
     pub lens: Option<[f32; 2]>,
 }
 

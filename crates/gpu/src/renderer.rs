@@ -462,7 +462,9 @@ impl Renderer {
         };
         let view = uniforms.push(&view);
         let scene = match picture.model {
-            Model::Whitted => None,
+            Model::Whitted(ground) => {
+                ground.as_ref().map(|of| uniforms.push(&SceneUniform::from(of)))
+            }
             Model::Paths(lighting) => Some(uniforms.push(&SceneUniform::from(lighting))),
         };
         let counters = counter_count(picture);
@@ -586,7 +588,11 @@ impl Renderer {
         let arrays = &self.arrays;
         let array = match binding {
             0 => return self.uniforms.binding(plan.view),
-            15 => return self.uniforms.binding(plan.scene.expect("only kernels for paths use it")),
+            15 => {
+                return self
+                    .uniforms
+                    .binding(plan.scene.expect("only kernels that need it use it"));
+            }
             13 => return self.uniforms.binding(stage),
             18 => return self.uniforms.binding(batch),
             4 => &arrays.points,
@@ -622,8 +628,8 @@ impl Renderer {
 fn depth_count(picture: &Picture<'_>) -> u32 {
     match picture.model {
         _ if picture.kept_rays().is_some() => DEPTHS_OF_GLASS,
-        Model::Whitted if picture.material.reflection > 0.0 => picture.max_depth,
-        Model::Whitted => 1,
+        Model::Whitted(_) if picture.material.reflection > 0.0 => picture.max_depth,
+        Model::Whitted(_) => 1,
         // The last segment finds lights; without any, it is a shadow ray to the environment
         Model::Paths(lighting) => lighting.bounces + 1 + u32::from(picture.has_extents()),
     }
@@ -632,7 +638,7 @@ fn depth_count(picture: &Picture<'_>) -> u32 {
 /// Whether there are shadow rays to a source at a depth.
 fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
     let scene = match picture.model {
-        Model::Whitted => None,
+        Model::Whitted(_) => None,
         Model::Paths(lighting) => Some(lighting),
     };
     // The lights follow, then the environment and the lights of a catcher
@@ -663,7 +669,7 @@ fn counter_count(picture: &Picture<'_>) -> u32 {
 /// The uniforms of a picture.
 struct Plan {
     view: Uniform,
-    /// The lighting of paths.
+    /// The lighting of paths, or a ground.
     scene: Option<Uniform>,
     film: FilmSize,
     /// Number of counters of a sample.

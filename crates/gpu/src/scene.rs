@@ -24,7 +24,7 @@ use spherule_tree::accel;
 use spherule_tree::blocks::StoredLeaves;
 use wgpu::SubmissionIndex;
 
-use crate::lighting::Model;
+use crate::lighting::{Model, WhittedGround};
 use crate::memory::light_groups_of;
 use crate::picture::{
     Background, Camera, Denoising, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture,
@@ -33,7 +33,7 @@ use crate::picture::{
 use crate::pixels::{Cost, HostPixels, LightLayer, NearestSample, Pixels};
 use crate::readback::PendingPixels;
 use crate::renderer::{Colors, Renderer};
-use crate::scene_lighting::SceneLighting;
+use crate::scene_lighting::{SceneLighting, ground_of};
 use crate::spheres::{Centers, KeyLength, Order, Radii, Spheres};
 use crate::stored::{centers_of, grids_of};
 use crate::tree_need::TreeNeed;
@@ -50,10 +50,8 @@ pub enum Missing {
     Photons,
     /// Styles beside transmissive particles.
     StylesInGlass,
-    /// A ground in Whitted's model, or one with sand or a picture.
+    /// A ground with sand or a picture, or one below transmissive spheres in Whitted's model.
     Ground,
-    /// Depth of field in Whitted's model.
-    Lens,
     /// Two eyes.
     Stereo,
     /// Equirectangular pictures.
@@ -79,8 +77,9 @@ impl fmt::Display for Missing {
             Self::Mist => "mist",
             Self::Photons => "caustics of transmissive particles",
             Self::StylesInGlass => "styles beside transmissive particles",
-            Self::Ground => "a ground in Whitted's model, or one of sand or with a picture",
-            Self::Lens => "depth of field in Whitted's model",
+            Self::Ground => {
+                "a ground of sand or with a picture, or one below glass in Whitted's model"
+            }
             Self::Stereo => "stereo pairs",
             Self::Panorama => "equirectangular pictures",
             Self::LightExtent => "lights with an extent in Whitted's model",
@@ -104,7 +103,8 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     let is_style = |of: &scene::Material| matches!(of.owner, Owner::Style(_) | Owner::Part(_));
     let has_styles = scene.materials.iter().any(is_style);
     let is_plain = |ground: &scene::Ground| {
-        !is_whitted && matches!(ground.pattern, Pattern::Plain | Pattern::Checker { .. })
+        !(is_whitted && is_clear)
+            && matches!(ground.pattern, Pattern::Plain | Pattern::Checker { .. })
     };
     [
         (scene.materials.iter().any(scene::Material::scatters), Missing::Scattering),
@@ -112,7 +112,6 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (needs_photons(scene, settings), Missing::Photons),
         (is_clear && (has_styles || is_glossy), Missing::StylesInGlass),
         (scene.ground.as_ref().is_some_and(|ground| !is_plain(ground)), Missing::Ground),
-        (camera.lens().is_some() && is_whitted, Missing::Lens),
         (camera.stereo().is_some(), Missing::Stereo),
         (camera.projection().is_panorama(), Missing::Panorama),
         (scene.lights.iter().any(has_extent) && is_whitted, Missing::LightExtent),
@@ -399,7 +398,7 @@ impl SceneRenderer {
             has_objects: settings.channels.mattes().next().is_some(),
             light_groups: light_groups_of(settings),
             model: match settings.integrator {
-                IntegratorKind::Whitted => Model::Whitted,
+                IntegratorKind::Whitted => Model::Whitted(whitted_ground(scene)),
                 IntegratorKind::Path => Model::Paths(self.lighting.of(scene, source, settings)),
             },
             material: material_of(scene),
@@ -581,6 +580,16 @@ fn background_of(background: &scene::Background) -> Background {
             gradient([background::STUDIO_BOTTOM, background::STUDIO_TOP, up], true)
         }
     }
+}
+
+/// The ground of `scene` in Whitted's model.
+fn whitted_ground(scene: &Scene) -> Option<WhittedGround> {
+    let material = scene.material(scene::MaterialId::GROUND);
+    scene.ground.as_ref().map(|ground| WhittedGround {
+        plane: ground_of(ground, None),
+        ambient: (material.ambient * scene.ambient_light).to_array(),
+        diffuse: material.diffuse,
+    })
 }
 
 fn material_of(scene: &Scene) -> Material {

@@ -186,7 +186,8 @@ fn finish_of(finish: Finish, tables: &mut Tables) -> lighting::Finish {
     }
 }
 
-fn ground_of(ground: &scene::Ground, catcher: Option<Catcher>) -> Ground {
+/// The plane of `ground`, which has no pattern but squares.
+pub(crate) fn ground_of(ground: &scene::Ground, catcher: Option<Catcher>) -> Ground {
     Ground {
         up: ground.up.to_array(),
         height: ground.height,

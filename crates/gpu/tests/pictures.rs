@@ -66,6 +66,8 @@ fn every_setting_equals_the_cpu() {
         Case { is_parallel: true, ..small },
         Case { is_mapped: true, ..small },
         Case { is_studio: true, ..small },
+        Case { has_ground: true, ..small },
+        Case { has_ground: true, is_studio: true, has_mattes: true, ..small },
         Case { window: Some([-5, 9]), ..small },
         Case { particles: 1, ..small },
         Case { particles: 9, ..small },
@@ -73,6 +75,24 @@ fn every_setting_equals_the_cpu() {
     ] {
         assert_equal(&case, &support::compare(&mut renderer, &case, level));
     }
+}
+
+/// Compilers of drivers for CPUs round some of the rays through a lens in another way.
+const ROUNDED_BY_LENS: usize = 30;
+
+#[test]
+fn depth_of_field_is_that_of_the_cpu() {
+    let Some(device) = device(Checks::Off) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    let case = Case { has_lens: true, particles: 400, ..Case::small() };
+    let found = support::compare(&mut renderer, &case, level);
+    let Difference { ids, depths, normals, positions, mean, .. } = found;
+    assert!(
+        [ids, depths, normals, positions].into_iter().max() <= Some(ROUNDED_BY_LENS),
+        "{found:?}"
+    );
+    assert!(mean < 1e-3, "{found:?}");
 }
 
 /// Both draw the same picture, with the same noise. A ray that has left a rough surface may meet another sphere, which
@@ -111,8 +131,7 @@ fn paths_are_those_of_the_cpu() {
         let case = Case { paths: Some(paths), samples: 5, seed, particles: 400, ..Case::small() };
         let found = support::compare(&mut renderer, &case, level);
         let Difference { ids, depths, normals, positions, mean, bias, ray_ratio, .. } = found;
-        // Compilers of drivers for CPUs round some of the rays through a lens in another way
-        let most = if paths == Paths::Lens { 30 } else { 0 };
+        let most = if paths == Paths::Lens { ROUNDED_BY_LENS } else { 0 };
         let most_of_all = [ids, depths, normals, positions].into_iter().max();
         assert!(most_of_all <= Some(most), "{paths:?}: {found:?}");
         assert!(mean.max(bias) < 1e-3, "{paths:?}: {found:?}");

@@ -159,6 +159,10 @@ pub(crate) struct Case {
     pub(crate) is_mapped: bool,
     /// Two lights, one of them without shadows, and a gradient as background.
     pub(crate) is_studio: bool,
+    /// A checkerboard below the particles in Whitted's model, which fades out.
+    pub(crate) has_ground: bool,
+    /// A lens, in Whitted's model.
+    pub(crate) has_lens: bool,
     /// Position of the film in the image, if it is a part of it.
     pub(crate) window: Option<[i32; 2]>,
     /// Path tracing; else Whitted's model.
@@ -192,6 +196,8 @@ impl Case {
             is_parallel: false,
             is_mapped: false,
             is_studio: false,
+            has_ground: false,
+            has_lens: false,
             window: None,
             paths: None,
             opacity: None,
@@ -396,17 +402,26 @@ fn still_scene(case: &Case, angle: f64) -> Scene {
     if let Some(paths) = case.paths {
         return path_scene(paths, camera);
     }
-    let mut scene = Scene::new(camera);
+    let radius = if case.has_lens { 0.05 } else { 0.0 };
+    let mut scene = Scene::new(camera.with_lens(Lens { radius, focus: 6.0 }));
+    let bounds =
+        spherule_tracer::scene::Bounds { min: LOW.as_dvec3(), max: (LOW + SIZE).as_dvec3() };
     if case.is_studio {
-        let bounds =
-            spherule_tracer::scene::Bounds { min: LOW.as_dvec3(), max: (LOW + SIZE).as_dvec3() };
         scene.lights = default_lights(&bounds, DVec3::Z, &view);
         scene.background = Background::default_for(Vec3::Z);
     } else {
         let position = DVec3::new(0.0, 0.0, 10.0);
         scene.lights.push(Light::point(position, DVec3::ZERO, Vec3::ONE));
     }
+    scene.ground =
+        case.has_ground.then(|| checkerboard(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)));
     scene
+}
+
+/// `ground` with squares, which fades out near the particles.
+fn checkerboard(ground: Ground) -> Ground {
+    let pattern = Pattern::Checker { tile: 0.7 };
+    Ground { pattern, fade_start: 1.0, fade_end: 3.0, ..ground }
 }
 
 /// An image with details that are smaller than the pixels of environments.
@@ -456,9 +471,7 @@ fn path_scene(paths: Paths, camera: Camera) -> Scene {
     let visible = |kind| Light { is_visible: true, ..light(kind, Vec3::splat(4.0)) };
     match paths {
         Paths::Metal => {
-            let checker = Pattern::Checker { tile: 0.7 };
-            scene.ground =
-                Some(Ground { pattern: checker, fade_start: 1.0, fade_end: 3.0, ..ground });
+            scene.ground = Some(checkerboard(ground));
         }
         Paths::Look | Paths::Catcher | Paths::Backdrop | Paths::Mirrors | Paths::Coats => {
             scene.ground = Some(ground.into_shadow_catcher(0.8))

@@ -35,6 +35,13 @@ fn above_ground(ground: GroundHit) -> vec3<f32> {
   return ground.point + max(OFFSET_OF_ROUNDING * largest, 1.17549435e-38) * scene.ground_up;
 }
 
+fn ground_normal() -> vec3<f32> { return scene.ground_up; }
+
+// What it reflects of ambient light, and of other light, by Whitted's model
+fn ground_ambient() -> vec3<f32> { return scene.ground_ambient; }
+
+fn ground_diffuse() -> f32 { return scene.ground_diffuse; }
+
 fn ground_color(point: vec3<f32>) -> vec3<f32> {
   if (scene.ground_kind != CHECKER) { return scene.ground_color; }
   let v = (point - scene.ground_center) / scene.ground_tile;

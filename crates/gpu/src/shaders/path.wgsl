@@ -423,14 +423,7 @@ fn trace_camera(
   var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
   if (is_ray) {
-    start_sample(pixel);
-    path.on_film = film_position(at.x, at.y, sample_number());
-    ray = camera_ray(path.on_film, time_of(pixel));
-    path.on_film = seen_on_film(path.on_film, ray.time);
-    if (view.lens_radius > 0.0) {
-      let seed = child_of(seed_at(pixel, 0u, BOUNCED), CAMERA);
-      ray = through_lens(ray, numbers_2d(seed, LENS, sample_number()));
-    }
+    ray = start_sample(pixel, at, &path);
     ground = hit_ground(ray);
     hit = nearest(ray, ground.t, number_of_end(pixel, BOUNCED));
   }

@@ -113,7 +113,7 @@ fn object_of_ground(coverage: f32) -> u32 { return bitcast<u32>(-coverage); }
 fn no_surface() -> vec4<u32> { return vec4<u32>(bitcast<u32>(FAR), MISS, 0u, 0u); }
 
 // Empties a sample before its camera ray, and what its pixel adds up before the first one.
-fn start_sample(pixel: u32) {
+fn empty_sample(pixel: u32) {
   if (current.sample == 0u) { clear_layers(pixel); }
   film[place_in(view.first_film, pixel)] = vec4<f32>(0.0);
   data[2u * place_in(view.first_data, pixel)] = no_surface();

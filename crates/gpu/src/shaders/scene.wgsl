@@ -1,4 +1,4 @@
-// The uniform of path tracing: what the pictures of Whitted's model lack.
+// The uniform of path tracing; of Whitted's model only the ground.
 
 struct SceneUniform {
   // Axes of the environment, and the part of the light that a shadow catcher loses at most
@@ -12,6 +12,8 @@ struct SceneUniform {
   ground_base: vec3<f32>, fade_end: f32,
   ground_color: vec3<f32>, ground_kind: u32,
   ground_across: vec3<f32>, ground_tile: f32,
+  // Of Whitted's model
+  ground_ambient: vec3<f32>, ground_diffuse: f32,
   // Tables of the environment, and of it times the cosine with the ground; without one, the edge is 0
   environment: Table,
   catcher: Table,

@@ -16,3 +16,14 @@ fn no_ray(state: State) -> Next {
 fn camera_path(pixel: u32, on_film: vec2<f32>) -> Path {
   return Path(vec3<f32>(1.0), FAR, pixel, on_film, vec3<f32>(1.0), camera_state(pixel));
 }
+
+// The ray of a sample of the pixel at a column and row. Its planes are empty then.
+fn start_sample(pixel: u32, at: vec2<u32>, path: ptr<function, Path>) -> Ray {
+  empty_sample(pixel);
+  let on_film = film_position(at.x, at.y, sample_number());
+  let ray = camera_ray(on_film, time_of(pixel));
+  (*path).on_film = seen_on_film(on_film, ray.time);
+  if (view.lens_radius == 0.0) { return ray; }
+  let seed = child_of(seed_at(pixel, 0u, BOUNCED), CAMERA);
+  return through_lens(ray, numbers_2d(seed, LENS, sample_number()));
+}

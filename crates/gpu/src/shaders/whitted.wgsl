@@ -13,9 +13,6 @@ fn seen_at_end(direction: vec3<f32>) -> vec3<f32> { return background(direction)
 
 fn group_at_end() -> u32 { return 0u; }
 
-// There is no ground
-fn ground_color(point: vec3<f32>) -> vec3<f32> { return vec3<f32>(0.0); }
-
 // The direction to the light from `start`, and the distance.
 fn toward(source: Light, start: vec3<f32>) -> vec4<f32> {
   if (source.kind == DISTANT) { return vec4<f32>(source.place, FAR); }
@@ -67,7 +64,7 @@ fn stored_path(i: u32) -> Path {
 }
 
 // Adds what a ray sees without shadows, and appends the rays that leave its intersection.
-fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
+fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   var sum = vec4<f32>(0.0);
   var surface: Surface;
   var albedo = vec3<f32>(0.0);
@@ -75,10 +72,12 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
   var next = no_ray(path.state);
   let pixel = path.pixel;
   let is_hit = is_ray && hit.slot != MISS;
+  let is_ground = is_ray && !is_hit && ground.t < FAR;
+  let uncovered = select(1.0, 1.0 - ground.opacity, is_ground);
   if (is_ray && !is_hit && stage.depth > 1u) {
-    sum = vec4<f32>(path.throughput * background(ray.direction), 0.0);
+    sum = vec4<f32>(uncovered * path.throughput * background(ray.direction), 0.0);
   } else if (is_ray && !is_hit && view.transparent == 0u) {
-    sum = vec4<f32>(backdrop(ray.direction, path.on_film), 0.0);
+    sum = vec4<f32>(uncovered * backdrop(ray.direction, path.on_film), 0.0);
   }
   if (is_hit) {
     surface = surface_at(ray, hit);
@@ -100,6 +99,17 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
       }
     }
   }
+  if (is_ground) {
+    surface.normal = ground_normal();
+    surface.start = above_ground(ground);
+    if (stage.depth == 1u) {
+      sum.w = select(1.0, ground.opacity, view.transparent == 1u);
+      film[second_place(pixel)] = vec4<f32>(0.0);
+      keep_surface(depth_of(ray, ground.t), GROUND, surface.normal, ground.point, pixel);
+    }
+    albedo = ground.opacity * throughput * clamp(ground_color(ground.point), vec3<f32>(0.0), vec3<f32>(1.0));
+    sum += vec4<f32>(albedo * ground_ambient(), 0.0);
+  }
   go_on(is_hit, path, throughput, ray, surface, &next, &sum);
   let queue = queue_of(stage.depth);
   count_refracted(next);
@@ -109,9 +119,13 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
   for (var number = 0u; number < view.light_count; number++) {
     let source = view.lights[number];
     var radiance = vec3<f32>(0.0);
-    if (is_hit) {
+    if (is_hit || is_ground) {
       let into = toward(source, surface.start);
-      radiance = source.radiance * blinn_phong(surface.normal, -ray.direction, into.xyz, albedo, throughput);
+      if (is_hit) {
+        radiance = source.radiance * blinn_phong(surface.normal, -ray.direction, into.xyz, albedo, throughput);
+      } else {
+        radiance = source.radiance * (ground_diffuse() * max(dot_in_order(surface.normal, into.xyz), 0.0)) * albedo;
+      }
       if (source.kind == POINT_WITH_FALLOFF) { radiance /= into.w * into.w; }
     }
     let is_lit = max(max(radiance.x, radiance.y), radiance.z) > 0.0;
@@ -127,7 +141,8 @@ fn follow(is_ray: bool, ray: Ray, path: Path, hit: Hit) {
   }
   if (is_ray) {
     add_to_film(pixel, sum);
-    keep_object(pixel, select(MISS, hit.index, is_hit));
+    let of_ground = object_of_ground(select(1.0, ground.opacity, view.transparent == 1u));
+    keep_object(pixel, select(select(MISS, of_ground, is_ground), hit.index, is_hit));
   }
 }
 
@@ -141,16 +156,15 @@ fn trace_camera(
   let is_ray = at.x < view.width && at.y < view.height && sample_number() < view.samples;
   let pixel = at.y * view.width + at.x;
   var ray: Ray;
+  var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
   var path = camera_path(pixel, vec2<f32>(0.0));
   if (is_ray) {
-    start_sample(pixel);
-    path.on_film = film_position(at.x, at.y, sample_number());
-    ray = camera_ray(path.on_film, time_of(pixel));
-    path.on_film = seen_on_film(path.on_film, ray.time);
-    hit = nearest(ray, FAR, number_of_end(pixel, REFLECTED));
+    ray = start_sample(pixel, at, &path);
+    ground = hit_ground(ray);
+    hit = nearest(ray, ground.t, number_of_end(pixel, REFLECTED));
   }
-  follow(is_ray, ray, path, hit);
+  follow(is_ray, ray, path, ground, hit);
 }
 
 // Adds the light that arrives along a shadow ray.
@@ -159,7 +173,9 @@ fn follow_shadow(i: u32) {
   let start = shadows[place];
   let into = toward(view.lights[stage.source], start.xyz);
   let pixel = pixel_in(start.w);
-  let passing = transmittance(Ray(start.xyz, into.xyz, time_of(pixel)), into.w, true);
+  let ray = Ray(start.xyz, into.xyz, time_of(pixel));
+  if (is_below_ground(ray, into.w)) { return; }
+  let passing = transmittance(ray, into.w, true);
   if (passing > 0.0) {
     film[second_place(pixel)] += vec4<f32>(passing * shadows[place + 1u].xyz, 0.0);
   }
@@ -169,13 +185,15 @@ fn follow_shadow(i: u32) {
 fn follow_next(i: u32, is_ray: bool) {
   var ray: Ray;
   var path = camera_path(0u, vec2<f32>(0.0));
+  var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
   var hit = Hit(0.0, MISS, MISS);
   if (is_ray) {
     path = stored_path(i);
     ray = Ray(rays[RAY * i].xyz, rays[RAY * i + 1u].xyz, time_of(path.pixel));
-    hit = nearest(ray, FAR, number_of_end(path.pixel, REFLECTED));
+    ground = hit_ground(ray);
+    hit = nearest(ray, ground.t, number_of_end(path.pixel, REFLECTED));
   }
-  follow(is_ray, ray, path, hit);
+  follow(is_ray, ray, path, ground, hit);
 }
 
 // The rays that were reflected at the depth before, then the shadow rays of a source from there, in workgroups of their own.
