@@ -2,9 +2,11 @@
 //! full, and a part of the tiles of their images is traced.
 //!
 //! The estimate assumes that the time of reading and building is proportional to the size of the files, that the
-//! measured frames are representative, and that the load of the machine does not change. Tracing has a time box: if
-//! not even the smallest trial finishes in time, the result is a lower bound.
+//! measured frames are representative, and that the load of the machine does not change. What a picture needs before its
+//! first pixel, such as maps of the light on the ground, counts once, however few tiles are traced. Tracing has a time box:
+//! if not even the smallest trial finishes in time, the result is a lower bound.
 
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
@@ -16,9 +18,9 @@ use super::{
     load_frame, renderer_of,
 };
 use crate::output::{OutputError, PictureFormat, PreviewOptions, encode_exr, encode_preview};
-use crate::render::{Deadline, Film, RenderError, RendererKind};
+use crate::render::{Film, RenderError, RendererKind, Stop};
 
-/// Width in pixels of the first mosaic of tiles; each further one is twice as wide.
+/// Width in pixels of the first mosaic of tiles; further ones are twice or four times as wide.
 const FIRST_WIDTH: u32 = 32;
 /// Minimum tracing time of a sufficient trial, seconds.
 const MIN_SECONDS: f64 = 0.15;
@@ -80,8 +82,39 @@ pub enum ProbeError {
 struct Trial {
     setup: Setup,
     film: Film,
-    seconds: f64,
+    /// Time before its pixels, and in them, seconds.
+    before: f64,
+    in_pixels: f64,
     is_interrupted: bool,
+}
+
+/// Stops a trial that takes longer than `limit` before its pixels, or in them.
+struct TimeBox {
+    limit: Duration,
+    start: Instant,
+    pixels: OnceLock<Instant>,
+}
+
+impl TimeBox {
+    fn new(limit: Duration) -> Self {
+        Self { limit, start: Instant::now(), pixels: OnceLock::new() }
+    }
+
+    /// Time before the pixels so far, and in them, seconds. A device has nothing to do before them.
+    fn seconds(&self) -> [f64; 2] {
+        let begin = self.pixels.get().unwrap_or(&self.start);
+        [begin.duration_since(self.start), begin.elapsed()].map(|time| time.as_secs_f64())
+    }
+}
+
+impl Stop for TimeBox {
+    fn is_raised(&self) -> bool {
+        self.pixels.get().unwrap_or(&self.start).elapsed() >= self.limit
+    }
+
+    fn pixels_begin(&self) {
+        self.pixels.get_or_init(Instant::now);
+    }
 }
 
 /// Time of one image, seconds, and its size, bytes.
@@ -121,10 +154,9 @@ fn probe_for(
         let frame = prepare(&mut *renderer, setup, sequence, heaviest)?;
         // The first picture on a GPU compiles its kernels
         if setup.picture.renderer == RendererKind::Gpu {
-            let far = Instant::now() + TIME_FOR_KERNELS;
-            Trial::of(&*renderer, setup, &frame, [FIRST_WIDTH; 2], far)?;
+            Trial::of(&*renderer, setup, &frame, [FIRST_WIDTH; 2], TIME_FOR_KERNELS)?;
         }
-        let trial = largest_trial(&*renderer, setup, &frame, Instant::now() + time_box)?;
+        let trial = largest_trial(&*renderer, setup, &frame, time_box)?;
         let size = [trial.film.width, trial.film.height];
         let part = (!trial.is_interrupted).then(|| trial.part(setup));
         (frame.report, size, part, trial.cost(setup, heaviest)?)
@@ -136,8 +168,7 @@ fn probe_for(
         if start.elapsed() > TIME_FOR_OTHERS {
             break;
         }
-        let deadline = Instant::now() + time_box;
-        costs.extend(trial_cost(&mut *renderer, setup, sequence, task, (trial_size, deadline)));
+        costs.extend(trial_cost(&mut *renderer, setup, sequence, task, (trial_size, time_box)));
     }
     // Average the costs
     let frames = 1 + u32::try_from(costs.len()).unwrap_or(0);
@@ -160,16 +191,16 @@ fn probe_for(
     })
 }
 
-/// The cost of the image of `task`, from a trial of the given size before the deadline; None if it cannot be measured.
+/// The cost of the image of `task`, from a trial of the given size within a time; None if it cannot be measured.
 fn trial_cost(
     renderer: &mut dyn FrameRenderer,
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-    (size, deadline): ([u32; 2], Instant),
+    (size, limit): ([u32; 2], Duration),
 ) -> Option<ImageCost> {
     let frame = prepare(renderer, setup, sequence, task).ok()?;
-    let trial = Trial::of(renderer, setup, &frame, size, deadline).ok()?;
+    let trial = Trial::of(renderer, setup, &frame, size, limit).ok()?;
     if trial.is_interrupted {
         return None;
     }
@@ -187,12 +218,12 @@ fn prepare(
 }
 
 /// Traces mosaics of the image of `frame` with increasing size until one is sufficient. Returns the last one that
-/// finished before `deadline`, or the first one.
+/// finished within `time` for the pixels of all, or the first one.
 fn largest_trial(
     renderer: &dyn FrameRenderer,
     setup: &Setup,
     frame: &BuiltFrame,
-    deadline: Instant,
+    mut time: Duration,
 ) -> Result<Trial, ProbeError> {
     let full = &setup.picture.render;
     let mut width = FIRST_WIDTH.min(full.width);
@@ -201,18 +232,22 @@ fn largest_trial(
         // Trace a mosaic with the aspect ratio of the image
         let exact = u64::from(full.height) * u64::from(width) / u64::from(full.width);
         let height = u32::try_from(exact).unwrap_or(full.height).max(1);
-        let trial = Trial::of(renderer, setup, frame, [width, height], deadline)?;
+        let trial = Trial::of(renderer, setup, frame, [width, height], time)?;
         if trial.is_interrupted {
             return Ok(last.unwrap_or(trial));
         }
         // Stop if it is sufficient, or if the next one would not finish in time
-        let is_sufficient = trial.seconds > MIN_SECONDS && width * height >= MIN_PIXELS;
-        let next_ends = Instant::now() + Duration::from_secs_f64(4.0 * trial.seconds) < deadline;
-        if is_sufficient || !next_ends || 2 * width > full.width {
+        if trial.in_pixels > MIN_SECONDS && width * height >= MIN_PIXELS {
             return Ok(trial);
         }
+        let seconds = Duration::from_secs_f64(trial.in_pixels);
+        time = time.saturating_sub(seconds);
+        // Each begins with the same work before its pixels: fewer mosaics if that takes most of the time
+        let factors = if trial.before > trial.in_pixels { &[4, 2][..] } else { &[2] };
+        let ends = |by: &&u32| **by * width <= full.width && seconds * **by * **by < time;
+        let Some(factor) = factors.iter().find(ends) else { return Ok(trial) };
+        width *= factor;
         last = Some(trial);
-        width *= 2;
     }
 }
 
@@ -223,7 +258,7 @@ impl Trial {
         setup: &Setup,
         frame: &BuiltFrame,
         [width, height]: [u32; 2],
-        deadline: Instant,
+        limit: Duration,
     ) -> Result<Self, ProbeError> {
         // Set up the mosaic
         let mut setup = setup.clone();
@@ -235,10 +270,10 @@ impl Trial {
             settings.samples = settings.samples.min(MAX_SAMPLES);
         }
         let channels = settings.channels;
-        // Trace it until the deadline
-        let start = Instant::now();
-        let traced = renderer.image(&setup, frame, &Deadline(deadline));
-        let seconds = start.elapsed().as_secs_f64();
+        // Trace it until the time has passed
+        let time_box = TimeBox::new(limit);
+        let traced = renderer.image(&setup, frame, &time_box);
+        let [before, in_pixels] = time_box.seconds();
         let (film, is_interrupted) = match traced {
             Ok((film, _)) => (film, false),
             Err(TraceError::Render(RenderError::Interrupted)) => {
@@ -246,7 +281,7 @@ impl Trial {
             }
             Err(error) => return Err(error.into()),
         };
-        Ok(Self { setup, film, seconds, is_interrupted })
+        Ok(Self { setup, film, before, in_pixels, is_interrupted })
     }
 
     /// Fraction of the pixels of the full image.
@@ -283,7 +318,7 @@ impl Trial {
         // Scale the costs to the full image
         let encode = start.elapsed().as_secs_f64();
         Ok(ImageCost {
-            trace: self.seconds / self.part(full),
+            trace: self.before + self.in_pixels / self.part(full),
             encode: encode / self.pixels(full),
             bytes: bytes as f64 / self.pixels(full),
         })
@@ -291,7 +326,7 @@ impl Trial {
 }
 
 impl Probe {
-    /// Maximum time of tracing trials per frame.
+    /// Maximum time of the pixels of all trials of a frame, and before the pixels of each.
     pub const TIME_BOX: Duration = Duration::from_secs(3);
 
     /// Estimated time for frames of these sizes on `threads` threads, seconds. `probed` is the size of the heaviest
@@ -330,9 +365,8 @@ mod tests {
 
     use super::*;
 
-    // The second probe has time to trace all that it measures.
-    #[test]
-    fn no_time_to_trace_gives_a_lower_bound() {
+    /// A frame of the dam break, and how to draw it.
+    fn example() -> (Setup, Sequence, ImageTask) {
         let example = "examples/dam-break/ParticleData_Fluid_1.bgeo";
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(example);
         let sequence = Sequence::open(&SequenceInput::from_path(&file)).expect("a frame");
@@ -352,6 +386,25 @@ mod tests {
             next_meshes: None,
             refused: None,
         };
+        (setup, sequence, task)
+    }
+
+    #[test]
+    fn what_comes_before_the_pixels_counts_once() {
+        let (full, _, task) = example();
+        let mut setup = full.clone();
+        setup.picture.render.samples = 4;
+        let film = Film::new(192, 108, full.picture.render.channels);
+        let trial = Trial { setup, film, before: 3.0, in_pixels: 0.5, is_interrupted: false };
+        assert_eq!([full.picture.render.width, full.picture.render.samples], [1920, 16]);
+        let cost = trial.cost(&full, &task).expect("an image");
+        assert!((cost.trace - (3.0 + 400.0 * 0.5)).abs() < 1e-6, "{}", cost.trace);
+    }
+
+    // The second probe has time to trace all that it measures.
+    #[test]
+    fn no_time_to_trace_gives_a_lower_bound() {
+        let (setup, sequence, task) = example();
         let cut_off =
             probe_for(Duration::ZERO, &setup, &sequence, &task, &[&task]).expect("a probe");
         assert!(cut_off.is_lower_bound && cut_off.traced_part == 0.0);

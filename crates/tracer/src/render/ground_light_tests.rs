@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use glam::{DVec3, Vec3};
 
@@ -185,6 +185,46 @@ fn photons_are_the_same_on_any_number_of_threads_and_can_be_stopped() {
     let light =
         |photons| image(&Balls(Vec::new()), &scene, Vec3::ONE, &with_photons(photons, 4)).color;
     assert_eq!(light(10), light(20_000));
+}
+
+/// How often it was asked before pixels began, how often these began, and how many there were.
+#[derive(Default)]
+struct Phases {
+    asked_before: AtomicU32,
+    begun: AtomicU32,
+    pixels: AtomicU32,
+}
+
+impl Stop for Phases {
+    fn is_raised(&self) -> bool {
+        if self.begun.load(Ordering::SeqCst) == 0 {
+            self.asked_before.fetch_add(1, Ordering::SeqCst);
+        }
+        false
+    }
+
+    fn pixels_begin(&self) {
+        assert_eq!(self.pixels.load(Ordering::SeqCst), 0);
+        self.begun.fetch_add(1, Ordering::SeqCst);
+    }
+
+    fn pixels_done(&self, count: u32) {
+        assert_eq!(self.begun.load(Ordering::SeqCst), 1);
+        self.pixels.fetch_add(count, Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn pixels_begin_after_the_light_on_the_ground() {
+    let source = ParticleShading::constant(Vec3::ONE);
+    let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 1.2), 1.0);
+    for photons in [0, 1000] {
+        let phases = Phases::default();
+        render(&[&ball], &floor(white()), &source, &with_photons(photons, 1), &phases).unwrap();
+        let Phases { asked_before, begun, pixels } = phases;
+        assert_eq!(asked_before.into_inner() > 0, photons > 0);
+        assert_eq!([begun.into_inner(), pixels.into_inner()], [1, 32 * 32]);
+    }
 }
 
 /// The floor around a ball of water that it cuts in the middle, with an albedo, and a strength of its wetness.

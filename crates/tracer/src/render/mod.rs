@@ -143,7 +143,7 @@ pub use settings::{
 pub use source::mean;
 pub use source::opacity_of;
 pub use source::{Colors, Opacities, ParticleShading, ShadeSource, StyleShading};
-pub use stop::{Deadline, Stop};
+pub use stop::Stop;
 pub use window::DataWindow;
 
 use adaptive::Passes;
@@ -270,6 +270,7 @@ pub fn render_into(
     let (integrators, before) = integrators_of(contexts.collect(), ground_pass, settings, stop)?;
     let first = RenderSettings::pass_with(&passes, settings.least_samples());
     let passes = Passes { integrators, first, samples: settings.samples, limit: settings.noise };
+    stop.pixels_begin();
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // Reuse scratch memory: there is one per thread, and all are released at the end of the image
