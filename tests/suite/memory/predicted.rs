@@ -302,7 +302,7 @@ fn further_smooth_surfaces() {
 
 #[test]
 fn spray_is_predicted_from_the_survey() {
-    let spray = ["--look", "water", "--radius", "0.01"];
+    let spray = ["--look", "water", "--radius", "0.01", "--set", "render.caustics={photons=20000}"];
     let options = [&SMALL[..], &spray].concat();
     compare_bound("npy", |path| splash(path, 10_000), &options);
 }

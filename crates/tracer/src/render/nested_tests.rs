@@ -250,7 +250,7 @@ fn paths_and_photons_pass_two_bodies_like_one() {
             max_depth: 8,
             photons: 100_000,
             channels: Channels::ALL,
-            ..path_settings(32, 32, 2)
+            ..path_settings(24, 32, 2)
         };
         let [two, one] = as_two_and_one(&settings, glass);
         let colors = |film: &Film| -> Vec<Vec3> {
