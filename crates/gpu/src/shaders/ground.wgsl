@@ -15,8 +15,9 @@ fn hit_ground(ray: Ray) -> GroundHit {
   let point = ray.origin + scaled(ray.direction, t);
   let outside = max(abs(point - scene.ground_center) - scene.ground_base, vec3<f32>(0.0));
   let span = max(scene.fade_end - scene.fade_start, 1.17549435e-38);
-  let x = clamp((scene.fade_end - sqrt(dot(outside, outside))) / span, 0.0, 1.0);
-  let opacity = x * x * (3.0 - 2.0 * x);
+  // A part of the coverage, so with the bits of the CPU
+  let x = clamp(quotient(scene.fade_end - root(dot_in_order(outside, outside)), span), 0.0, 1.0);
+  let opacity = mul(mul(x, x), 3.0 - 2.0 * x);
   if (!(opacity > 0.0)) { return none; }
   return GroundHit(t, opacity, point);
 }
