@@ -2,7 +2,7 @@
 //! `no_gpu.rs` in its place.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use spherule_files::memory::MemoryUse;
@@ -374,7 +374,7 @@ impl FrameRenderer for GpuRenderer {
         stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), TraceError> {
         let mut film = Film::default();
-        let cost = self.draw(setup, frame, None, stop)?.store(setup, &mut film)?;
+        let (cost, _) = self.draw(setup, frame, None, stop)?.store(setup, &mut film)?;
         Ok((film, ray_counts(&cost)))
     }
 
@@ -492,22 +492,23 @@ struct DeviceImage {
 }
 
 impl DeviceImage {
-    /// Waits for the image and stores it. Returns what it has cost.
-    fn store(self, setup: &Setup, film: &mut Film) -> Result<Cost, TraceError> {
+    /// Waits for the image and stores it. Returns what it has cost, and how long it was stored.
+    fn store(self, setup: &Setup, film: &mut Film) -> Result<(Cost, Duration), TraceError> {
         let (image, cost) = self.image.wait().map_err(failed)?;
+        let start = Instant::now();
         let scene = setup.scene_at(self.frame, self.focus)?;
         with_source(setup, &self.particles, |source| {
             let stored = image.store(film, &scene, source, &settings_of(setup));
             stored.map_err(TraceError::Render)
         })?;
-        Ok(cost)
+        Ok((cost, start.elapsed()))
     }
 }
 
 impl UnfinishedImage for DeviceImage {
     fn finish(self: Box<Self>, setup: &Setup, frame: &mut TracedFrame) -> Result<(), TraceError> {
         let started = self.started;
-        let cost = self.store(setup, &mut frame.film)?;
+        let (cost, download) = self.store(setup, &mut frame.film)?;
         let rays = ray_counts(&cost);
         let report = &mut frame.report;
         // A device without a clock tells no time
@@ -518,7 +519,9 @@ impl UnfinishedImage for DeviceImage {
         report.clamped_light = rays.lost.part(&frame.film.color, setup.picture.render.samples);
         report.rays = rays.into();
         if let Some(device) = &mut report.device {
+            device.upload = report.seconds.build;
             (device.build, device.trace) = (cost.build_seconds, cost.trace_seconds);
+            (device.denoise, device.download) = (cost.denoise_seconds, download.as_secs_f64());
             device.bytes = cost.bytes;
         }
         Ok(())

@@ -75,7 +75,13 @@ mod on_a_device {
         workshop.render_to("cpu", &with(&["--device=cpu"])).expect(0);
         assert_equal(&workshop, ["gpu", "cpu"]);
         let report = std::fs::read_to_string(workshop.join("gpu/report.json")).expect("a report");
-        assert!(report.contains("\"driver\""), "{report}");
+        for key in ["driver", "upload", "build", "trace", "denoise", "download", "bytes"] {
+            assert!(report.contains(&format!("\"{key}\"")), "{key}: {report}");
+        }
+        let page = std::fs::read_to_string(workshop.join("gpu/report.html")).expect("a page");
+        assert!(page.contains("GPU: copies to it, from it"), "{page}");
+        let status = workshop.run(&["status", "gpu"]).expect(0).text();
+        assert!(status.contains("GPU") && status.contains("in the last frame"), "{status}");
         // The same bytes once more, in processes that take the same device
         workshop.render_to("again", &with(&[&DEVICE[..], &["--isolate"]].concat())).expect(0);
         assert_eq!(images(&workshop.join("again")), images(&workshop.join("gpu")));

@@ -51,7 +51,7 @@ pub struct SamplingSummary {
     pub noisy: f64,
 }
 
-/// A picture on a GPU. Times are seconds on its own clock, 0 if it has none.
+/// A picture on a GPU. Times are seconds on its own clock, 0 if it has none; those of copies are the host's.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct DeviceSummary {
@@ -59,12 +59,37 @@ pub struct DeviceSummary {
     pub name: String,
     /// Name and version of its driver.
     pub driver: String,
+    /// Copying the frame to the device.
+    pub upload: f64,
     /// Building the tree.
     pub build: f64,
     /// Tracing the picture.
     pub trace: f64,
+    /// Removing noise.
+    pub denoise: f64,
+    /// Copying the picture to its film.
+    pub download: f64,
     /// Memory of the device in use, bytes.
     pub bytes: u64,
+}
+
+impl DeviceSummary {
+    /// Adds the times of another picture; keeps the larger memory, and the names of all devices.
+    fn add(&mut self, other: &Self) {
+        for (names, name) in [(&mut self.name, &other.name), (&mut self.driver, &other.driver)] {
+            if names.is_empty() {
+                names.clone_from(name);
+            } else if names.split(", ").all(|known| known != name) {
+                *names = format!("{names}, {name}");
+            }
+        }
+        self.upload += other.upload;
+        self.build += other.build;
+        self.trace += other.trace;
+        self.denoise += other.denoise;
+        self.download += other.download;
+        self.bytes = self.bytes.max(other.bytes);
+    }
 }
 
 /// Wall-clock seconds of the stages, from the moment that they have a thread; neighbouring frames overlap.
@@ -240,6 +265,9 @@ impl FrameReport {
         self.rss.anonymous_peak = self.rss.anonymous_peak.max(frame.rss.anonymous_peak);
         self.rss.file_peak = self.rss.file_peak.max(frame.rss.file_peak);
         self.rss.total_peak = self.rss.total_peak.max(frame.rss.total_peak);
+        if let Some(device) = &frame.device {
+            self.device.get_or_insert_default().add(device);
+        }
     }
 }
 

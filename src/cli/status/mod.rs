@@ -11,6 +11,8 @@ use spherule_jobs::{EntryStatus, FrameState, Job, JobState, JobSummary, WorkerSt
 use super::job::{job_directory, no_job};
 use super::print::{self, Reader};
 use super::{CliError, Outcome};
+use crate::report::FrameReport;
+use crate::report::frame::DeviceSummary;
 
 mod show;
 
@@ -89,6 +91,14 @@ impl JobSnapshot {
         frames.retain(|frame| self.state.frame_state(*frame) != Some(FrameState::Done));
         frames.sort_unstable();
         frames
+    }
+
+    /// What the frame that was finished last has of a GPU.
+    fn device(&self) -> Option<DeviceSummary> {
+        let entries = self.state.ledger().entries();
+        let done = entries.filter(|entry| entry.status == EntryStatus::Done);
+        let last = done.max_by_key(|entry| entry.time_ms)?;
+        serde_json::from_value::<FrameReport>(last.details.value()).ok()?.device
     }
 
     /// Frames per second recently, if a worker is active and enough frames are done.

@@ -1,11 +1,13 @@
 //! The state of a job as text and as JSON.
 
 use serde_json::{Value, json};
+use spherule_files::Bytes;
 use spherule_jobs::{FrameState, WorkerStatus};
 
 use super::JobSnapshot;
 use crate::cli::job::list;
 use crate::cli::progress::duration;
+use crate::report::frame::DeviceSummary;
 
 /// Number of failed frames that are printed with their reasons.
 const MAX_REASONS: usize = 20;
@@ -35,6 +37,9 @@ impl JobSnapshot {
         if let (Some(rate), Some(left)) = (self.rate(), self.seconds_left()) {
             let each = format!("{rate:.2} frames per second");
             line("rate", &format!("{each}, {} left", duration(left)));
+        }
+        if let Some(device) = self.device() {
+            line("GPU", &device_line(&device));
         }
         for (frame, reason) in self.reasons().take(MAX_REASONS) {
             line("failure", &format!("frame {frame}: {reason}"));
@@ -73,6 +78,7 @@ impl JobSnapshot {
             "missing": self.summary.lost,
             "failed": failed,
             "workers": workers,
+            "device": self.device(),
             "frames_per_second": self.rate(),
             "seconds_left": self.seconds_left(),
         })
@@ -92,6 +98,20 @@ fn worker_line(worker: &WorkerStatus) -> String {
         format!("last heartbeat {} ago", duration(seconds))
     };
     format!("{process}: {work}, {liveness}")
+}
+
+fn device_line(device: &DeviceSummary) -> String {
+    let DeviceSummary { name, driver, upload, build, trace, denoise, download, bytes } = device;
+    let stages = [
+        ("upload", upload),
+        ("build", build),
+        ("trace", trace),
+        ("denoise", denoise),
+        ("download", download),
+    ];
+    let times = stages.map(|(stage, seconds)| format!("{stage} {:.1} ms", 1e3 * seconds));
+    let memory = Bytes(*bytes);
+    format!("{name} ({driver}): {}, {memory} in the last frame", times.join(", "))
 }
 
 fn worker_json(worker: &WorkerStatus) -> Value {

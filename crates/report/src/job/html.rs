@@ -6,6 +6,7 @@ use super::numbers::{bytes, count, duration, percent, seconds as time, short, sh
 use super::{JobReport, Status};
 use crate::FrameReport;
 use crate::THESIS_BYTES_PER_PARTICLE;
+use crate::frame::DeviceSummary;
 use crate::page::{Page, Table};
 
 /// Maximum length of a list of frame numbers or of a setting, in characters.
@@ -96,6 +97,7 @@ impl JobReport {
             ("Clamped pixels (too bright)", count(totals.clamped_pixels)),
             ("Light lost to render.clamp, at most", percent(totals.clamped_light)),
         ]);
+        list.extend(totals.device.iter().flat_map(of_device));
         list
     }
 
@@ -145,6 +147,18 @@ impl JobReport {
         page.table(&table);
         page.end_fold();
     }
+}
+
+/// What the totals have of a GPU.
+fn of_device(device: &DeviceSummary) -> [(&'static str, String); 4] {
+    let name = format!("{} ({})", device.name, device.driver);
+    let times = [device.build, device.trace, device.denoise].map(duration).join(", ");
+    [
+        ("GPU", shortened(&name, MAX_TEXT)),
+        ("GPU: build, trace, denoise", times),
+        ("GPU: copies to it, from it", [device.upload, device.download].map(duration).join(", ")),
+        ("GPU: most memory", bytes(device.bytes)),
+    ]
 }
 
 /// Seconds by phase, and their percentage of the total.

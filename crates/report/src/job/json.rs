@@ -49,6 +49,7 @@ impl JobReport {
             "rays": totals.rays,
             "rays_per_second": totals.rays_per_second(),
             "rss": totals.rss,
+            "device": totals.device,
         })
     }
 }
