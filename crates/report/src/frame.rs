@@ -79,8 +79,8 @@ impl DeviceSummary {
         for (names, name) in [(&mut self.name, &other.name), (&mut self.driver, &other.driver)] {
             if names.is_empty() {
                 names.clone_from(name);
-            } else if names.split(", ").all(|known| known != name) {
-                *names = format!("{names}, {name}");
+            } else if names.split("; ").all(|known| known != name) {
+                *names = format!("{names}; {name}");
             }
         }
         self.upload += other.upload;
@@ -330,6 +330,28 @@ const fn float(count: u64) -> f64 {
 mod tests {
     use super::*;
     use spherule_tree::accel::Structure;
+
+    #[test]
+    fn totals_name_each_device_once() {
+        let frame = |name: &str, bytes| FrameReport {
+            device: Some(DeviceSummary {
+                name: name.to_owned(),
+                driver: "1.2".to_owned(),
+                upload: 0.5,
+                bytes,
+                ..DeviceSummary::default()
+            }),
+            ..FrameReport::default()
+        };
+        let mut totals = FrameReport::default();
+        for report in [frame("A, 8 bits", 3), frame("B", 7), frame("A, 8 bits", 5)] {
+            totals.add(&report);
+        }
+        totals.add(&FrameReport::default());
+        let device = totals.device.expect("frames of devices");
+        assert_eq!([device.name.as_str(), device.driver.as_str()], ["A, 8 bits; B", "1.2"]);
+        assert_eq!((device.upload, device.bytes), (1.5, 7));
+    }
 
     fn built(file_bytes: u64) -> BuildReport {
         BuildReport {
