@@ -2,9 +2,9 @@
 //! full, and a part of the tiles of their images is traced.
 //!
 //! The estimate assumes that the time of reading and building is proportional to the size of the files, that the
-//! measured frames are representative, and that the load of the machine does not change. What a picture needs before its
-//! first pixel, such as maps of the light on the ground, counts once, however few tiles are traced. Tracing has a time box:
-//! if not even the smallest trial finishes in time, the result is a lower bound.
+//! measured frames are representative, and that the load of the machine does not change. What a picture needs before
+//! its first pixel, such as maps of the light on the ground, counts once, however few tiles are traced. Tracing has a
+//! time box: if not even the smallest trial finishes in time, the result is a lower bound.
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};

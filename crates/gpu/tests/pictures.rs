@@ -212,7 +212,7 @@ fn parts_of_the_light_are_those_of_the_cpu() {
     let Some(device) = device(Checks::On) else { return };
     let level = same_arithmetic(&device);
     let mut renderer = SceneRenderer::new(Arc::new(device));
-    // The others differ from these in what they have parts of no other kind of
+    // Light has no other parts in the other kinds
     let kinds =
         [Paths::Look, Paths::Catcher, Paths::Lights, Paths::Ambient, Paths::Mirrors, Paths::Coats];
     for paths in kinds {
