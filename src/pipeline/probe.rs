@@ -100,10 +100,12 @@ impl TimeBox {
         Self { limit, start: Instant::now(), pixels: OnceLock::new() }
     }
 
-    /// Time before the pixels so far, and in them, seconds. A device has nothing to do before them.
+    /// Time before the pixels so far, and in them, seconds.
     fn seconds(&self) -> [f64; 2] {
-        let begin = self.pixels.get().unwrap_or(&self.start);
-        [begin.duration_since(self.start), begin.elapsed()].map(|time| time.as_secs_f64())
+        let times = self.pixels.get().map_or([self.start.elapsed(), Duration::ZERO], |begin| {
+            [begin.duration_since(self.start), begin.elapsed()]
+        });
+        times.map(|time| time.as_secs_f64())
     }
 }
 
@@ -244,8 +246,9 @@ fn largest_trial(
         time = time.saturating_sub(seconds);
         // Each begins with the same work before its pixels: fewer mosaics if that takes most of the time
         let factors = if trial.before > trial.in_pixels { &[4, 2][..] } else { &[2] };
+        let begins = Duration::from_secs_f64(trial.before) < time;
         let ends = |by: &&u32| **by * width <= full.width && seconds * **by * **by < time;
-        let Some(factor) = factors.iter().find(ends) else { return Ok(trial) };
+        let Some(factor) = factors.iter().find(ends).filter(|_| begins) else { return Ok(trial) };
         width *= factor;
         last = Some(trial);
     }
@@ -399,6 +402,17 @@ mod tests {
         assert_eq!([full.picture.render.width, full.picture.render.samples], [1920, 16]);
         let cost = trial.cost(&full, &task).expect("an image");
         assert!((cost.trace - (3.0 + 400.0 * 0.5)).abs() < 1e-6, "{}", cost.trace);
+    }
+
+    // What was stopped before its pixels took that long, however few tiles it would have had.
+    #[test]
+    fn pixels_have_no_time_before_they_begin() {
+        let time_box = TimeBox::new(Duration::ZERO);
+        assert!(time_box.is_raised());
+        assert_eq!(time_box.seconds()[1], 0.0);
+        let before = time_box.start.elapsed();
+        time_box.pixels_begin();
+        assert!(time_box.seconds()[0] >= before.as_secs_f64());
     }
 
     // The second probe has time to trace all that it measures.

@@ -405,6 +405,7 @@ impl SceneRenderer {
             split_weight: settings.min_weight,
             lights: &lights,
         };
+        stop.pixels_begin();
         let shown = Cell::new(0);
         let show = |done: u64| {
             let more = done - shown.replace(done);
